@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import OpenEXR
 from PIL import Image
+from skimage.color import deltaE_ciede2000, rgb2lab
 from skimage.metrics import structural_similarity
 
 GREY = ((188 / 255 + 0.055) / 1.055) ** 2.4
@@ -41,7 +42,7 @@ def whole_windows(mask):
     return inside
 
 
-def mateval_1(truth, prediction, mask):
+def mateval(truth, prediction, mask):
     """Errors of linear values, SSIM of the windows wholly inside."""
     mse = ((truth - prediction) ** 2)[mask].mean()
     windows = whole_windows(mask)
@@ -58,7 +59,7 @@ def paper(truth, prediction, mask):
 def main(dataset):
     room = pathlib.Path(dataset) / "scenes/room"
     novel = sorted(view.name for view in (room / "views").iterdir() if view.name != "input")
-    for rules in (mateval_1, paper):
+    for rules in (mateval, paper):
         for views, names, region in (("input", ["input"], "valid"), ("novel", novel, "valid"), ("unobserved", novel, "unobserved")):
             for aligned in (False, True):
                 found = []
@@ -71,9 +72,13 @@ def main(dataset):
                         p, t = prediction[valid], truth[valid]
                         prediction = prediction * ((t * p).sum(0) / (p * p).sum(0))
                     mse, similarity = rules(truth, prediction, mask(region))
-                    found.append((mse, 10 * np.log10(1 / mse), similarity))
+                    valid = mask("valid")
+                    lab = [rgb2lab(encoded(picture)) for picture in (truth, prediction)]
+                    found.append((mse, 10 * np.log10(1 / mse), similarity, deltaE_ciede2000(*lab)[valid].mean()))
                 key = f"albedo{'_aligned' if aligned else ''}.{views}"
-                for metric, values in zip(("mse", "psnr", "ssim"), zip(*found)):
+                for metric, values in zip(("mse", "psnr", "ssim", "delta_e"), zip(*found)):
+                    if views == "unobserved" and metric in ("ssim", "delta_e"):
+                        continue
                     print(rules.__name__, f"{key}.{metric}", f"{np.mean([v for v in values if v is not None]):.9f}")
 
 

@@ -173,7 +173,7 @@ def report(*, out: Path, rooms: dict[str, str]) -> None:
     results = {}
     for method in METHODS:
         file = json.loads((out / "results" / f"{method}.json").read_text())
-        results[method] = file["protocols"]["mateval-2"]["scenes"]
+        results[method] = file["protocols"]["mateval-3"]["scenes"]
     wins = {"LPIPS": 0, "PSNR": 0, "unobserved PSNR": 0, "unobserved LPIPS": 0}
     losses: dict[str, list[float]] = {"PSNR": [], "LPIPS": []}
     print("PSNR in dB and LPIPS of novel views: median-part, procedural; of unobserved regions: nn, keep-seen")

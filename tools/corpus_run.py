@@ -188,7 +188,7 @@ def try_case(*, case: Case, folder: Path, mateval: str, seconds: float) -> Resul
     steps: list[Step] = []
     for words in (
         ["build", recipe, "--source", case.source, "--out", dataset],
-        ["render", dataset, "--renderer", "builtin", "--samples", SAMPLES],
+        ["render", dataset, "--renderer", "builtin", "--samples", SAMPLES, "--scorer-samples", SAMPLES],
         ["verify", dataset, "--format", "json"],
     ):
         steps.append(run_limited(words=[mateval, "prep", *map(str, words)], seconds=seconds))

@@ -29,13 +29,13 @@ at_once() {
 }
 
 "$mateval" prep build "$recipe" --out "$work/serial" > /dev/null
-"$mateval" prep render "$work/serial" > /dev/null
+"$mateval" prep render --scorer-samples 16 "$work/serial" > /dev/null
 round=0
 while [ "$round" -lt "$rounds" ]; do
     rm -rf "$work/apart"
     at_once build "$recipe" --out "$work/apart"
     "$mateval" prep finish "$work/apart" > /dev/null
-    at_once render "$work/apart"
+    at_once render --scorer-samples 16 "$work/apart"
     "$mateval" prep finish "$work/apart" > /dev/null
     cmp "$work/serial/MANIFEST.sha256" "$work/apart/MANIFEST.sha256"
     cmp "$work/serial/dataset.json" "$work/apart/dataset.json"

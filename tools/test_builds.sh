@@ -16,7 +16,7 @@ for build in debug release; do
     "$mateval" sample "$out/source"
     sed -i 's/^resolution = .*/resolution = [96, 72]\natlas_size = 128/' "$out/source/recipe.toml"
     "$mateval" prep build "$out/source/recipe.toml" --out "$out/dataset"
-    "$mateval" prep render --renderer builtin --samples 2 "$out/dataset"
+    "$mateval" prep render --renderer builtin --samples 2 --scorer-samples 16 "$out/dataset"
     "$mateval" baseline nn --dataset "$out/dataset" --out "$out/nn"
     "$mateval" eval score "$out/nn" --dataset "$out/dataset" --out "$out/RESULT.json"
 done

@@ -82,7 +82,6 @@ sed -i 's/^resolution = .*/resolution = [32, 24]\natlas_size = 64\nsamples = 1/'
 serial() {
     "$mateval" prep build "$work/source/recipe.toml" --out dataset
     "$mateval" prep render dataset
-    "$mateval" prep companions dataset
     mkdir -p results
     for method in gt grey nn; do
         "$mateval" baseline "$method" --dataset dataset --out "submissions/$method"
@@ -95,7 +94,7 @@ cd "$work/serial"
 echo "serial: $(cat seconds) s for $rooms rooms"
 
 cd "$work/cluster"
-cost='{build: {threads: 1, mem_mb: 900}, render: {threads: 1, mem_mb: 900}, companions: {threads: 1, mem_mb: 900}, score: {threads: 1, mem_mb: 900}, whole: {mem_mb: 900}}'
+cost='{build: {threads: 1, mem_mb: 900}, render: {threads: 1, mem_mb: 900}, scorer: {threads: 1, mem_mb: 900}, score: {threads: 1, mem_mb: 900}, whole: {mem_mb: 900}}'
 cat > config.yaml <<CONF
 recipe: $work/source/recipe.toml
 renderer: builtin
@@ -110,7 +109,7 @@ run_snakemake() {
 }
 done_of() { find "state/$1" -type f 2> /dev/null | wc -l; }
 
-# A node dies while scenes are built, and the controller while companions are made.
+# A node dies while scenes are built, and the controller while references are made.
 disturb() {
     while [ "$(done_of build)" -lt $((rooms / 3)) ]; do sleep 0.5; done
     kill -9 "$(cat "$work/slurm/slurmd.n2.pid")"
@@ -121,9 +120,9 @@ disturb() {
     echo "node n2 was killed with $(done_of build) scenes built"
     sleep 15
     node n2
-    while [ "$(done_of companions)" -lt $((rooms / 3)) ]; do sleep 0.5; done
+    while [ "$(done_of scorer)" -lt $((rooms / 3)) ]; do sleep 0.5; done
     kill -9 "$(cat "$work/slurm/slurmctld.pid")"
-    echo "the controller was killed with companions of $(done_of companions) scenes made"
+    echo "the controller was killed with references of $(done_of scorer) scenes made"
     sleep 10
     controller
     sleep 5

@@ -35,7 +35,7 @@ ls -l "$dist"
 printf '%s\n' 'name = "sample"' 'resolution = [96, 72]' 'atlas_size = 128' \
     '[[scene]]' 'id = "room"' 'bitterli = "room/scene.xml"' 'house = "sample"' > "$work/source/recipe.toml"
 "$mateval" prep build "$work/source/recipe.toml" --out "$work/dataset"
-"$mateval" prep render "$work/dataset" --renderer builtin --samples 1
+"$mateval" prep render "$work/dataset" --renderer builtin --samples 1 --scorer-samples 16
 
 {
     printf '%s\n' 'name = "eight"' 'resolution = [48, 36]' 'atlas_size = 64'
@@ -44,7 +44,7 @@ printf '%s\n' 'name = "sample"' 'resolution = [96, 72]' 'atlas_size = 128' \
     done
 } > "$work/source/eight.toml"
 "$mateval" prep build "$work/source/eight.toml" --out "$work/eight"
-"$mateval" prep render "$work/eight" --renderer builtin --samples 1
+"$mateval" prep render "$work/eight" --renderer builtin --samples 1 --scorer-samples 16
 
 # pyenv's commands of other versions than the chosen one are in no folder of PATH.
 PATH="$PATH:$(echo "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.*/bin | tr ' ' ':')"

@@ -254,7 +254,7 @@ def write_tiny_dataset(*, folder: Path) -> None:
     """The parts of a dataset that the tool reads: a list of scenes, and a picture of each."""
     from PIL import Image
 
-    value = {"format": "mateval/2", "scenes": list(SIZES), "manifest_sha256": "d" * 64}
+    value = {"format": "mateval/3", "scenes": list(SIZES), "manifest_sha256": "d" * 64}
     write_json(path=folder / "dataset.json", value=value)
     for scene, (width, height) in SIZES.items():
         path = folder / "scenes" / scene / "views/input/rgb.png"

@@ -7,29 +7,29 @@ import random
 import re
 import struct
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 EXAMPLE = Path(__file__).parents[2] / "dataset_spec/examples/result.json"
 VIEWS = ["input", "up_left", "up_right", "down_left", "down_right"]
 WEIGHTS = "b24653d691930ef38ebb65d7139a65227e482b1abcf5709f4805fe743fecb6c1"
 MANIFEST = "5" * 64
-METRICS = ["mse", "psnr", "ssim", "lpips_alex"]
+#: The metrics of each picture: in all views, and in all but `unobserved`.
 PICTURES = {
-    "albedo": ["input", "novel", "unobserved"],
-    "albedo_aligned": ["input", "novel", "unobserved"],
-    "rgb_true": ["input", "novel", "unobserved"],
-    "rgb_fitted": ["input", "novel", "unobserved"],
-    "rgb_relit": ["input", "novel", "unobserved"],
-    "roughness": ["input", "novel", "unobserved"],
-    "metallic": ["input", "novel", "unobserved"],
-    "albedo_specular": ["input", "novel"],
-    "rgb_true_specular": ["input", "novel"],
-    "texture_base_color": ["observed", "unobserved"],
+    "albedo": (["mse", "psnr"], ["ssim", "lpips_alex", "delta_e"]),
+    "albedo_aligned": (["mse", "psnr"], ["ssim", "lpips_alex", "delta_e"]),
+    "rgb_true": (["mse", "psnr"], ["ssim", "lpips_alex", "flip"]),
+    "rgb_relit": (["mse", "psnr"], ["ssim", "lpips_alex"]),
+    "roughness": (["mae", "mse"], []),
+    "metallic": (["mae", "mse"], []),
+    "rgb_true_specular": ([], ["mse", "psnr"]),
+    "roughness_specular": ([], ["mae"]),
+    "metallic_specular": ([], ["mae"]),
 }
-#: The noise of one kind of light: 0.3 dB from the truth's own pictures in every scene.
-NOISE = {"rgb_true.input.psnr": {
-    "standard_error_db": 0.31, "own_db": 0.05, "companions_db": 0.05, "truth_db": 0.3, "fit_db": 0.0, "samples": 16, "state": "limited_by_truth",
-}}
+#: The view and the region whose picture stands for those of each kind of views.
+PLACES = {"input": ("input", "valid"), "novel": ("up_left", "valid"), "unobserved": ("up_left", "unobserved")}
+#: The standard error, in dB, of one kind of light in every scene.
+NOISE = {"rgb_true.input.psnr": 0.04}
 CATEGORIES = [("Sofa", "Seat"), ("Dining Table", "Table"), ("WallInner", "Architecture")]
 
 
@@ -48,19 +48,53 @@ def scene_names(count: int) -> list[str]:
     return [f"room-{number:03}" for number in range(count)]
 
 
-def scene_values(*, psnr: float, chance: random.Random) -> dict[str, float]:
-    values = {}
-    for picture, views in PICTURES.items():
-        for view in views:
-            level = psnr + chance.gauss(0, 0.8) + (2 if view in ("input", "observed") else 0)
-            values[f"{picture}.{view}.psnr"] = level
-            values[f"{picture}.{view}.mse"] = 10 ** (-level / 10)
-            if picture.startswith("texture"):
-                continue
-            values[f"{picture}.{view}.ssim"] = 1 - 0.9 * math.exp(-level / 20)
-            if not picture.startswith(("roughness", "metallic")):
-                values[f"{picture}.{view}.lpips_alex"] = 0.9 * math.exp(-level / 15)
-    return dict(sorted(values.items()))
+def scene_pictures(*, scene: str, psnr: float, chance: random.Random) -> list[dict]:
+    """One picture for each kind of views."""
+    pictures = []
+    for picture, (everywhere, where_whole) in PICTURES.items():
+        for views, (view, region) in PLACES.items():
+            level = psnr + chance.gauss(0, 0.8) + (2 if views == "input" else 0)
+            known = {
+                "mse": 10 ** (-level / 10), "mae": 10 ** (-level / 20), "psnr": level, "ssim": 1 - 0.9 * math.exp(-level / 20),
+                "lpips_alex": 0.9 * math.exp(-level / 15), "flip": 0.8 * math.exp(-level / 15), "delta_e": 60 * math.exp(-level / 15),
+            }
+            metrics = everywhere + (where_whole if views != "unobserved" else [])
+            if metrics:
+                pictures.append({
+                    "scene": scene, "view": view, "picture": picture, "region": region, "pixels": 1000,
+                    "values": {metric: known[metric] for metric in metrics},
+                })
+    return pictures
+
+
+def scene_means(pictures: list[dict]) -> dict[str, float]:
+    """The values themselves, since each mean is that of one picture."""
+    views = {place: views for views, place in PLACES.items()}
+    return {
+        f"{one['picture']}.{views[one['view'], one['region']]}.{metric}": value
+        for one in pictures
+        for metric, value in one["values"].items()
+    }
+
+
+def summary(scenes: list[dict[str, float]]) -> dict[str, float]:
+    """Means over scenes. The sums are in plain order, as MatEval's are: `sum` corrects roundings, and a reader would refuse the result."""
+    totals = dict.fromkeys(scenes[0], 0.0)
+    for values in scenes:
+        for key, value in values.items():
+            totals[key] += value
+    return {key: total / len(scenes) for key, total in totals.items()}
+
+
+def summary_noise(count: int) -> dict[str, float]:
+    """The standard errors of means over this number of scenes, whose noise is independent."""
+    errors = {}
+    for key, error in NOISE.items():
+        squares = 0.0
+        for _ in range(count):
+            squares += error * error
+        errors[key] = math.sqrt(squares) / count
+    return errors
 
 
 def instances(*, scenes: list[str], psnr: float) -> list[dict]:
@@ -75,34 +109,38 @@ def instances(*, scenes: list[str], psnr: float) -> list[dict]:
     return found
 
 
-def result(*, method: str, psnr: float, scenes: list[str], seed: int, **said: object) -> dict:
-    """A whole RESULT.json; two scenes share a house."""
+def result(
+    *, method: str, psnr: float, scenes: list[str], seed: int, not_predicted: Sequence[str] = (), **said: object
+) -> dict:
+    """A whole RESULT.json; two scenes share a house. Maps that are not predicted have no values."""
     example = json.loads(EXAMPLE.read_text())
-    protocol = example["protocols"]["mateval-2"]["protocol"]
+    protocol = example["protocols"]["mateval-3"]["protocol"]
     chance = random.Random(seed)
-    values = {}
+    pictures = {}
     for at, scene in enumerate(scenes):
         # A scene is equally hard or easy for all methods.
         ease = random.Random(f"scene {at}").gauss(0, 2)
-        values[scene] = scene_values(psnr=psnr + ease, chance=chance)
-    keys = values[scenes[0]]
+        of_scene = scene_pictures(scene=scene, psnr=psnr + ease, chance=chance)
+        pictures[scene] = [one for one in of_scene if not one["picture"].startswith(tuple(not_predicted))]
+    values = {scene: scene_means(of_scene) for scene, of_scene in pictures.items()}
     scores = {
         "protocol": protocol,
-        "fingerprint": sha256(pretty([protocol, MANIFEST, scenes, "builtin", WEIGHTS])),
-        "summary": {key: sum(v[key] for v in values.values()) / len(values) for key in keys},
-        "scenes": values, "summary_noise": {}, "noise": {scene: dict(NOISE) for scene in scenes},
-        "companions": {}, "fits": {}, "pictures": [], "texels": [],
+        "fingerprint": sha256(pretty([protocol, MANIFEST, scenes, WEIGHTS])),
+        "summary": summary([values[scene] for scene in sorted(scenes)]),
+        "scenes": values, "summary_noise": summary_noise(len(scenes)), "noise": {scene: dict(NOISE) for scene in scenes},
+        "fits": {}, "pictures": [one for of_scene in pictures.values() for one in of_scene], "texels": [],
         "instances": instances(scenes=scenes, psnr=psnr),
     }
     return {
-        "format": "mateval-result/5", "tool": "mateval 0.1.0", "method": method,
+        "format": "mateval-result/6", "tool": "mateval 0.1.0", "method": method,
         "submission": {"sha256": sha256(method + str(seed)), "description": said.pop("description", ""), **said},
         "dataset": {
             "name": "synthetic", "version": "1.0", "manifest_sha256": MANIFEST, "scenes": scenes,
-            "total_scenes": len(scenes), "scored_renderer": "builtin",
+            "total_scenes": len(scenes), "photo_renderer": "builtin",
             "houses": {scene: f"house-{at // 2 if len(scenes) > 12 else at}" for at, scene in enumerate(scenes)},
         },
-        "lpips_weights": {"alex": WEIGHTS}, "protocols": {"mateval-2": scores}, "missing": [], "findings": [],
+        "lpips_weights": {"alex": WEIGHTS}, "protocols": {"mateval-3": scores},
+        "not_predicted": list(not_predicted), "tracer_check": {"informative": 65, "agree": 65}, "missing": [], "findings": [],
     }
 
 

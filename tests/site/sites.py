@@ -17,7 +17,7 @@ METHODS = [
     ("TrueTexture", "truetexture", 33.0, 1, {"licence": "MIT", "url": "https://example.org/true",
                                              "cost": {"seconds_a_scene": 12.5, "hardware": "one laptop"}}),
     ("CopyA", "copya", 27.0, 2, {"licence": "CC-BY-NC-4.0", "cost": {"seconds_a_scene": 340.0, "hardware": "one large GPU"}}),
-    ("CopyB", "copyb", 27.0, 2, {"description": "the same as CopyA, bit by bit"}),
+    ("CopyB", "copyb", 27.0, 2, {"description": "the colours of CopyA, bit by bit", "not_predicted": ["roughness"]}),
     ("A method with a name that is quite a bit longer than others", "a-method-with-a-name-that-is-quite-a-bit-longer", 24.0, 4,
      {"cost": {"seconds_a_scene": 3.0, "hardware": ""}}),
     (EVIL, "script-document-title-broken-in-script", 20.0, 5, {"url": "javascript:alert(1)"}),

@@ -127,11 +127,24 @@ class TestLooks(unittest.TestCase):
         self.assertNotEqual(first["head"], second["head"])
         self.assertEqual(page.run("table.tBodies[0].innerText.includes('ceiling')"), False)
 
-    def test_methods_that_the_truth_cannot_tell_apart_are_named(self) -> None:
-        text = (small / "index.html").read_text()
-        sentence = "CopyA and CopyB are 0.000 dB apart, the truth&#x27;s noise is 0.087 dB"
-        self.assertIn(sentence, text)
-        self.assertEqual(text.count("dB apart"), 1)
+    def test_the_check_of_the_tracer_is_stated(self) -> None:
+        self.assertIn("Tracer and Blender agree in 65 of 65 informative checks.", (small / "index.html").read_text())
+
+    def test_maps_that_are_not_predicted_have_a_dash(self) -> None:
+        """In the columns that are loaded after a choice."""
+        page = Page(width=1400, height=900, dark=False)
+        self.addCleanup(page.close)
+        page.open((small / "index.html").as_uri())
+        for choice in ["[name=picture][value=roughness]", "[name=metric][value=mae]"]:
+            page.run(f"document.querySelector('input{choice}').click()")
+            page.wait_for("location.hash.includes('sort=')")
+        cells = """(() => {
+          const at = headOf("roughness.novel.mae").cellIndex;
+          return Object.fromEntries([...table.tBodies[0].rows].map((row) => [row.dataset.id, row.cells[at].innerText]));
+        })()"""
+        found = page.run(cells)
+        self.assertEqual(found["copyb"], "–")
+        self.assertRegex(found["copya"], r"^0\.\d{4}")
 
     def test_faults_of_appearance_are_found(self) -> None:
         """The twin: text of low contrast, a wide box, a script that fails, and a picture from another site."""
@@ -359,7 +372,7 @@ class TestLarge(unittest.TestCase):
             page.wait_for("location.hash.includes('ssim')")
             rows, columns = page.run("[document.querySelectorAll('#board tbody tr').length, document.querySelectorAll('#board th[data-metric]').length]")
             self.assertEqual(rows, 50)
-            self.assertGreater(columns, 80)
+            self.assertGreater(columns, 40)
             self.assertLess(seconds, 2.0)
             sorting = page.run("""(() => { const start = performance.now();
                 document.querySelector('#board th[data-key="albedo.input.psnr"] button').click();

@@ -63,7 +63,7 @@ fn four_builds_and_renders_at_once_lose_nothing() {
         for done in at_once(SCENES.map(|scene| of_scene(render(&out, 1), scene))) {
             done.ends_with(0);
         }
-        run(&mut finish(&out)).ends_with(0).prints("scored by builtin");
+        run(&mut finish(&out)).ends_with(0).prints("photos by builtin");
         assert!(manifest(&out) == manifest(&SERIAL.rendered), "round {round}");
         let json = |dataset: &Path| std::fs::read_to_string(dataset.join("dataset.json")).unwrap();
         assert_eq!(json(&out), json(&SERIAL.rendered));
@@ -161,9 +161,9 @@ fn a_scene_that_was_left_out_is_taken_in_again() {
     run(&mut of_scene(build(&SERIAL.recipe, copy.path()), "first")).ends_with(0);
     run(of_scene(build(&SERIAL.recipe, copy.path()), "fourth").arg("--force")).ends_with(0);
     without("fourth").ends_with(0);
-    run(&mut finish(copy.path())).ends_with(0).prints("4 scenes, without scored renders");
+    run(&mut finish(copy.path())).ends_with(0).prints("4 scenes, without photos");
     run(&mut of_scene(render(copy.path(), 1), "fourth")).ends_with(0);
-    run(&mut finish(copy.path())).ends_with(0).prints("scored by builtin");
+    run(&mut finish(copy.path())).ends_with(0).prints("photos by builtin");
     assert!(manifest(copy.path()) == manifest(&SERIAL.rendered));
     without("third").ends_with(0);
     run(&mut finish(copy.path())).ends_with(0);

@@ -298,7 +298,7 @@ fn a_result_with_an_unknown_key() {
         &["explain", "changed.json", "--scene", "room", "--dataset", "dataset", "--submission", "submission"],
     ] {
         let refused = run(mateval().current_dir(folder.path()).arg("eval").args(words)).ends_with(2);
-        refused.says("'albedo.input.mze' is not a key of a result").says("/protocols/mateval-2/summary");
+        refused.says("'albedo.input.mze' is not a key of a result").says("/protocols/mateval-3/summary");
     }
     assert!(!path("site").exists());
 }

@@ -84,7 +84,7 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
     let dataset = copy.path();
     run(&mut by_blender(dataset, &python, &[])).ends_with(0);
     run(&mut verify(dataset)).ends_with(0);
-    assert_eq!(json(&dataset.join("dataset.json"))["scored_renderer"], "blender");
+    assert_eq!(json(&dataset.join("dataset.json"))["photo_renderer"], "blender");
     assert!(!dataset.join(".render").exists());
     let first = manifest(dataset);
     // Existing renders are kept; a forced second render is the same.
@@ -123,7 +123,7 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
 
     // Our own tracer's pictures change neither what is scored nor what is shown.
     run(&mut render(dataset, 1)).ends_with(0);
-    assert_eq!(json(&dataset.join("dataset.json"))["scored_renderer"], "blender");
+    assert_eq!(json(&dataset.join("dataset.json"))["photo_renderer"], "blender");
     run(&mut verify(dataset)).ends_with(0);
 }
 

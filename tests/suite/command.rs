@@ -73,10 +73,10 @@ pub fn build(recipe: &Path, dataset: &Path) -> Command {
     command
 }
 
-/// `mateval prep render DATASET --samples SAMPLES`.
+/// `mateval prep render DATASET --samples SAMPLES`, with references of few samples.
 pub fn render(dataset: &Path, samples: u32) -> Command {
     let mut command = mateval();
-    command.args(["prep", "render", "--samples", &samples.to_string()]).arg(dataset);
+    command.args(["prep", "render", "--samples", &samples.to_string(), "--scorer-samples", "16"]).arg(dataset);
     command
 }
 
@@ -104,7 +104,7 @@ pub fn baseline(name: &str, dataset: &Path, submission: &Path) -> Command {
 /// `mateval eval score SUBMISSION --dataset DATASET --out RESULT` under both protocols.
 pub fn score(submission: &Path, dataset: &Path, result: &Path) -> Command {
     let mut command = mateval();
-    command.args(["eval", "score", "--protocol", "mateval-2", "--protocol", "paper"]).arg(submission);
+    command.args(["eval", "score", "--protocol", "mateval-3", "--protocol", "paper"]).arg(submission);
     command.arg("--dataset").arg(dataset).arg("--out").arg(result);
     command
 }

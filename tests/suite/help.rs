@@ -95,14 +95,13 @@ fn missing_arguments() {
 /// Every subcommand has a help text.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 19] = [
+    let subcommands: [&[&str]; 18] = [
         &["demo"],
         &["sample"],
         &["prep"],
         &["prep", "build"],
         &["prep", "survey"],
         &["prep", "render"],
-        &["prep", "companions"],
         &["prep", "compare"],
         &["prep", "verify"],
         &["prep", "stats"],

@@ -117,7 +117,7 @@ fn accepted_rooms_become_a_dataset_that_can_be_scored() {
         let [submission, result] = [name.to_owned(), format!("{name}.json")].map(|name| folder.path().join(name));
         run(&mut baseline(name, &dataset, &submission)).ends_with(0);
         run(score(&submission, &dataset, &result).env("MATEVAL_CACHE", folder.path())).ends_with(0);
-        json(&result)["protocols"]["mateval-2"]["summary"]["albedo.input.psnr"].as_f64().unwrap()
+        json(&result)["protocols"]["mateval-3"]["summary"]["albedo.input.psnr"].as_f64().unwrap()
     };
     let (truth, grey) = (psnr("gt"), psnr("grey"));
     assert!(truth > 25.0 && grey < 15.0, "gt {truth} dB, grey {grey} dB");

@@ -30,7 +30,7 @@ pub static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
 /// The summary of `nn` with the truth's pictures.
 static NN: LazyLock<Value> = LazyLock::new(|| scored(&ROOM, "nn", &[]));
 
-/// Summary of a baseline's score under `mateval-2`, without LPIPS.
+/// Summary of a baseline's score under `mateval-3`, without LPIPS.
 fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let submission = folder.path().join("submission");
@@ -38,13 +38,13 @@ fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
     summary_of(dataset, &submission)
 }
 
-/// Summary of a submission's score under `mateval-2`, without LPIPS.
+/// Summary of a submission's score under `mateval-3`, without LPIPS.
 pub fn summary_of(dataset: &Path, submission: &Path) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let result = folder.path().join("result.json");
     let mut command = score(submission, dataset, &result);
     run(command.env("MATEVAL_CACHE", folder.path().join("no-such-folder"))).ends_with(0);
-    json(&result)["protocols"]["mateval-2"]["summary"].clone()
+    json(&result)["protocols"]["mateval-3"]["summary"].clone()
 }
 
 pub fn psnr(summary: &Value, key: &str) -> f64 {

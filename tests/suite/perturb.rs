@@ -134,7 +134,7 @@ fn submissions_are_scored_on_the_true_geometry() {
         let result = submission.with_extension("json");
         run(score(submission, dataset(), &result).env("MATEVAL_CACHE", folder.path())).ends_with(0);
         let result = json(&result);
-        (result["protocols"]["mateval-2"]["summary"].clone(), result["submission"]["geometry"].clone())
+        (result["protocols"]["mateval-3"]["summary"].clone(), result["submission"]["geometry"].clone())
     };
     perturb(dataset(), "pose", 3, &path("moved")).ends_with(0);
     run(&mut baseline("nn", &path("moved"), &path("none")))

@@ -144,11 +144,11 @@ fn result_of(dataset: &Path) -> Value {
 #[test]
 fn light_is_left_out_where_it_is_not_known() {
     let mixed = result("mixed");
-    let scores = &mixed["protocols"]["mateval-2"];
+    let scores = &mixed["protocols"]["mateval-3"];
     let keys = |scene: &str| -> Vec<String> { scores["scenes"][scene].as_object().unwrap().keys().cloned().collect() };
     let has = |scene: &str, start: &str| keys(scene).iter().any(|key| key.starts_with(start));
     assert!(has("photographed", "albedo.input") && has("photographed", "albedo.novel"), "{:?}", keys("photographed"));
-    assert!(has("photographed", "roughness") && !has("photographed", "rgb_"), "{:?}", keys("photographed"));
+    assert!(!has("photographed", "rgb_"), "{:?}", keys("photographed"));
     assert!(has("plain", "rgb_true"), "{:?}", keys("plain"));
     // Means of light are of the one scene that has any.
     let psnr = "rgb_true.input.psnr";
@@ -162,12 +162,12 @@ fn light_is_left_out_where_it_is_not_known() {
 
 #[test]
 fn a_dataset_of_photos_alone_needs_no_renderer() {
-    assert!(json_of(&dataset("alone").join("dataset.json"))["scored_renderer"].is_null());
+    assert!(json_of(&dataset("alone").join("dataset.json"))["photo_renderer"].is_null());
     let alone = result("alone");
-    let summary = alone["protocols"]["mateval-2"]["summary"].as_object().unwrap();
+    let summary = alone["protocols"]["mateval-3"]["summary"].as_object().unwrap();
     assert!(summary.contains_key("albedo.input.psnr") && !summary.keys().any(|key| key.starts_with("rgb_")));
     assert!(alone["missing"].as_array().unwrap().iter().all(|missing| missing["metric"] == "lpips_alex"), "{alone}");
-    for step in ["companions", "compare"] {
+    for step in ["render", "compare"] {
         let name = dataset("alone");
         run_words([Path::new("prep"), Path::new(step), &name]).ends_with(0).says("photographed: no");
     }

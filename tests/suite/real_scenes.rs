@@ -18,7 +18,7 @@ fn staircase(source: &Path, folder: &Path, line: &str) -> serde_json::Value {
     run(build(&recipe, &dataset).arg("--source").arg(source)).ends_with(0);
     run(&mut baseline("gt", &dataset, &submission)).ends_with(0);
     run(score(&submission, &dataset, &result).env("MATEVAL_CACHE", folder)).ends_with(0);
-    json(&result)["protocols"]["mateval-2"]["summary"].clone()
+    json(&result)["protocols"]["mateval-3"]["summary"].clone()
 }
 
 /// 30,911 triangles in OBJ files; rectangles and disks are additional. With the atlases that the tool chooses the truth

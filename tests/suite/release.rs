@@ -116,9 +116,12 @@ fn the_report_states_what_the_release_is() {
     assert!(html.contains("5 of 5 checks agree") && !html.contains("not compared"));
     assert_eq!(file.scenes[0].noise.as_ref().unwrap().len(), 5);
     let steps: Vec<String> = file.scenes[0].costs.iter().map(|cost| format!("{:?}", cost.step)).collect();
-    assert_eq!(steps, ["Build", "Render"]);
+    assert_eq!(steps, ["Build", "Render", "Scorer"]);
     assert!(file.scenes[0].costs.iter().all(|cost| cost.wall_seconds > 0.0 && cost.cpu_seconds.unwrap() > 0.0));
-    assert_eq!(file.remake.commands[1], "mateval prep render DATASET --renderer builtin --samples 1");
+    assert_eq!(
+        file.remake.commands[1],
+        "mateval prep render DATASET --renderer builtin --samples 1 --scorer-samples 16"
+    );
     // What was not given is stated, with the way to give it.
     for text in ["The ceiling is not given", "--floor grey.json", "<h2 id=\"cite\">", "184", "13.2"] {
         assert!(html.replace("&#x2f;", "/").contains(text), "no '{text}'");
@@ -178,7 +181,7 @@ fn files_that_do_not_fit_are_refused_together() {
     // Results of another dataset, and one that was changed.
     let [ceiling, floor] = RESULTS.each_ref().map(|path| json(path));
     let mut changed = floor;
-    changed["protocols"]["mateval-2"]["fingerprint"] = json!("0".repeat(64));
+    changed["protocols"]["mateval-3"]["fingerprint"] = json!("0".repeat(64));
     let [ceiling, floor] = [("gt", ceiling), ("grey", changed)]
         .map(|(name, result)| write_json(&folder.path().join(name).with_extension("json"), &result));
     let out = folder.path().join("report");
@@ -193,7 +196,7 @@ fn files_that_do_not_fit_are_refused_together() {
         ("g_other.json", "/format"),
         ("h_bad.json", "/agrees"),
         ("gt.json", "/dataset/manifest_sha256"),
-        ("grey.json", "/protocols/mateval-2/fingerprint"),
+        ("grey.json", "/protocols/mateval-3/fingerprint"),
     ] {
         let lines: Vec<&str> = refused.stderr.lines().filter(|line| line.contains(file)).collect();
         assert!(lines.iter().any(|line| line.contains(&format!("' {place}:"))), "{file}: {}", refused.stderr);
@@ -274,7 +277,7 @@ fn scores_of_a_hidden_split_do_not_leak() {
     report(unrendered(), &hidden, halves.iter().map(|(name, path)| (*name, path.as_path())).chain(bounds)).ends_with(0);
     report(unrendered(), &shown, bounds).ends_with(0);
     let scores: Vec<String> =
-        RESULTS.iter().flat_map(|path| fingerprints(&json(path)["protocols"]["mateval-2"]["scenes"])).collect();
+        RESULTS.iter().flat_map(|path| fingerprints(&json(path)["protocols"]["mateval-3"]["scenes"])).collect();
     let texts = [&hidden, &shown].map(|out| std::fs::read_to_string(out.join("release.json")).unwrap() + &page(out));
     assert!(scores.len() > 20, "{scores:?}");
     for score in &scores {

@@ -33,7 +33,7 @@ fn the_workflow_builds_the_board_and_refuses_a_changed_result() {
     std::fs::remove_dir_all(folder.path().join("site")).unwrap();
     let mut changed = json(&result("grey"));
     (changed["method"], changed["submission"]["sha256"]) = ("another".into(), "0".repeat(64).into());
-    changed["protocols"]["mateval-2"]["fingerprint"] = "another".into();
+    changed["protocols"]["mateval-3"]["fingerprint"] = "another".into();
     std::fs::write(results.join("changed.json"), changed.to_string()).unwrap();
     run_workflow(folder.path()).ends_with(2).says("it was changed");
     assert!(!folder.path().join("site").exists());

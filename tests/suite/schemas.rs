@@ -36,7 +36,7 @@ fn write_schemas(folder: &Path) {
 fn schemas_are_those_of_the_types() {
     let made = tempfile::tempdir().unwrap();
     write_schemas(made.path());
-    assert_eq!(files(made.path()).len(), 25);
+    assert_eq!(files(made.path()).len(), 26);
     assert_eq!(differences(made.path(), &spec("schema")), Vec::<String>::new());
 }
 
@@ -62,7 +62,7 @@ fn nothing_is_overwritten_without_force() {
     run_words(["schema".as_ref(), folder.path().as_os_str()]).ends_with(2).says("add --force to overwrite it");
     assert_eq!(files(folder.path()).len(), 1);
     run_words(["schema".as_ref(), folder.path().as_os_str(), "--force".as_ref()]).ends_with(0);
-    assert_eq!(files(folder.path()).len(), 25);
+    assert_eq!(files(folder.path()).len(), 26);
 }
 
 fn json(path: &Path) -> Value {

@@ -46,10 +46,14 @@ fn value(summary: &Value, key: &str) -> f64 {
     summary[key].as_f64().unwrap_or_else(|| panic!("no {key} in {summary}"))
 }
 
-/// The scores of grey under `mateval-2` and under `paper`, from `tests/grey_scores.py` (OpenEXR 3.5.3, scikit-image 0.26.0,
+/// The scores of grey under `mateval-3` and under `paper`, from `tests/grey_scores.py` (OpenEXR 3.5.3, scikit-image 0.26.0,
 /// no code of this project): the prediction is a picture of the one colour that sRGB byte 188 stands for.
 #[rustfmt::skip]
-const GREY: [(&str, f64, f64); 18] = [
+const GREY: [(&str, f64, f64); 20] = [
+    ("albedo.input.delta_e", 29.904832147, 29.904832147),
+    ("albedo.novel.delta_e", 29.305634568, 29.305634568),
+    ("albedo_aligned.input.delta_e", 25.057364818, 25.057364818),
+    ("albedo_aligned.novel.delta_e", 24.704593363, 24.704593363),
     ("albedo.input.mse", 0.121929737, 0.127251615),
     ("albedo.input.psnr", 9.138903642, 8.953366979),
     ("albedo.input.ssim", 0.293123836, 0.422198192),
@@ -64,20 +68,20 @@ const GREY: [(&str, f64, f64); 18] = [
     ("albedo_aligned.novel.ssim", 0.344519166, 0.430683743),
     ("albedo.unobserved.mse", 0.095920714, 0.094223847),
     ("albedo.unobserved.psnr", 10.509476645, 11.582466218),
-    ("albedo.unobserved.ssim", 0.499458595, 0.931869601),
     ("albedo_aligned.unobserved.mse", 0.073660358, 0.058831747),
     ("albedo_aligned.unobserved.psnr", 11.810197059, 12.519287227),
-    ("albedo_aligned.unobserved.ssim", 0.506578182, 0.935912356),
 ];
 
-/// Keys whose value differs from the pinned one by more than a millionth.
+/// Keys whose value differs from the pinned one by more than a millionth, or of CIEDE2000 by more than scikit-image's
+/// rounding of its constants explains.
 fn off_grey(method: &str) -> Vec<String> {
-    let summaries = ["mateval-2", "paper"].map(|protocol| summary(method, protocol));
+    let summaries = ["mateval-3", "paper"].map(|protocol| summary(method, protocol));
     let mut off = Vec::new();
     for (key, ours, paper) in GREY {
         for (summary, expected) in summaries.iter().zip([ours, paper]) {
             let found = value(summary, key);
-            if (found - expected).abs() > 1e-6 * expected {
+            let bound = if key.ends_with("delta_e") { 2e-5 } else { 1e-6 };
+            if (found - expected).abs() > bound * expected {
                 off.push(format!("{key}: {found}, expected {expected}"));
             }
         }
@@ -88,7 +92,7 @@ fn off_grey(method: &str) -> Vec<String> {
 #[test]
 fn grey_scores_its_pinned_values() {
     assert_eq!(off_grey("grey"), [""; 0]);
-    for protocol in ["mateval-2", "paper"] {
+    for protocol in ["mateval-3", "paper"] {
         let grey = summary("grey", protocol);
         let is_whole = |key: &&String| key.starts_with("albedo") && !key.contains("_specular");
         let keys = grey.as_object().unwrap().keys().filter(is_whole).count();
@@ -110,21 +114,23 @@ fn greys_error_is_that_of_one_colour() {
         let errors: Vec<f64> = pixels.flat_map(|(rgb, _)| rgb.0.map(|v| (f64::from(v) - grey).powi(2))).collect();
         errors.iter().sum::<f64>() / errors.len() as f64
     };
-    let found = value(&summary("grey", "mateval-2"), "albedo.input.mse");
+    let found = value(&summary("grey", "mateval-3"), "albedo.input.mse");
     assert!((found - error_of(188)).abs() < 1e-6 * found, "{found}, expected {}", error_of(188));
     assert!((found - error_of(187)).abs() > 1e-4 * found);
 }
 
 #[test]
 fn the_truth_is_far_above_grey() {
-    for protocol in ["mateval-2", "paper"] {
+    for protocol in ["mateval-3", "paper"] {
         let [gt, grey] = ["gt", "grey"].map(|method| summary(method, protocol));
         for views in ["input", "novel", "unobserved"] {
             let [raw, aligned] = ["albedo", "albedo_aligned"].map(|p| value(&gt, &format!("{p}.{views}.psnr")));
             assert!(raw >= 38.0, "{protocol} {views}: {raw} dB");
             assert!((raw - aligned).abs() < 0.1, "{protocol} {views}: {raw} dB raw, {aligned} dB aligned");
             assert!(value(&grey, &format!("albedo.{views}.psnr")) < raw - 25.0);
-            assert!(value(&grey, &format!("albedo.{views}.ssim")) < value(&gt, &format!("albedo.{views}.ssim")));
+            if views != "unobserved" {
+                assert!(value(&grey, &format!("albedo.{views}.ssim")) < value(&gt, &format!("albedo.{views}.ssim")));
+            }
         }
     }
 }
@@ -143,7 +149,7 @@ fn tables_show_both_and_refuse_other_fingerprints() {
     let folder = tempfile::tempdir().unwrap();
     let other = folder.path().join("other.json");
     let mut changed = json(&result("grey"));
-    changed["protocols"]["mateval-2"]["fingerprint"] = "another".into();
+    changed["protocols"]["mateval-3"]["fingerprint"] = "another".into();
     std::fs::write(&other, changed.to_string()).unwrap();
     let refused = run(mateval().args(["eval", "tables"]).args([&result("gt"), &other])).ends_with(2);
     assert_eq!(refused.stdout, "");
@@ -162,7 +168,7 @@ fn lpips_without_weights_is_missing_and_names_the_fix() {
     assert_eq!(result["missing"][0]["metric"], "lpips_alex");
     assert_eq!(result["missing"][0]["fix"], FIX);
     assert_eq!(result["lpips_weights"], serde_json::json!({ "alex": null }));
-    for protocol in ["mateval-2", "paper"] {
+    for protocol in ["mateval-3", "paper"] {
         let summary = result["protocols"][protocol]["summary"].as_object().unwrap();
         assert!(!summary.keys().any(|key| key.contains("lpips")));
     }
@@ -182,20 +188,20 @@ fn lpips_with_weights_is_scored() {
         report_missing(lpips["reason"].as_str().unwrap());
         return;
     }
-    let ours = &result["protocols"]["mateval-2"];
-    for key in ["albedo.input.lpips_alex", "albedo_aligned.novel.lpips_alex", "albedo.unobserved.lpips_alex"] {
+    let ours = &result["protocols"]["mateval-3"];
+    for key in ["albedo.input.lpips_alex", "albedo_aligned.novel.lpips_alex", "albedo.novel.lpips_alex"] {
         let distance = value(&ours["summary"], key);
         assert!(distance > 0.05 && distance < 2.0, "{key} {distance}");
     }
     // Single values are stored in steps of a millionth.
     let pictures = ours["pictures"].as_array().unwrap();
-    let is_distance = |picture: &&Value| picture["metric"] == "lpips_alex" && !picture["value"].is_null();
-    for picture in pictures.iter().filter(is_distance) {
-        let steps = picture["value"].as_f64().unwrap() * 1e6;
-        assert!((steps - steps.round()).abs() < 1e-6, "{picture}");
-    }
+    let distances: Vec<f64> = pictures.iter().filter_map(|picture| picture["values"]["lpips_alex"].as_f64()).collect();
+    assert!(
+        distances.len() >= 10
+            && distances.iter().all(|value| (value * 1e6).fract().min(1.0 - (value * 1e6).fract()) < 1e-6)
+    );
     let without = json(&SCORED.join("grey.json"));
-    assert_ne!(ours["fingerprint"], without["protocols"]["mateval-2"]["fingerprint"]);
+    assert_ne!(ours["fingerprint"], without["protocols"]["mateval-3"]["fingerprint"]);
     let refused = run(mateval().args(["eval", "tables"]).args([&out, &SCORED.join("gt.json")]));
     refused.ends_with(2).says("different fingerprints");
 }

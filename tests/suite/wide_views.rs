@@ -136,7 +136,7 @@ fn unobserved_pixels_are_those_that_no_line_reaches() {
 fn other_views_score_what_they_did() {
     for method in ["gt", "nn"] {
         let [plain, wide] =
-            ["plain", "wide"].map(|name| result(&format!("{name}-{method}"))["protocols"]["mateval-2"].clone());
+            ["plain", "wide"].map(|name| result(&format!("{name}-{method}"))["protocols"]["mateval-3"].clone());
         let [plain, wide] = [&plain["summary"], &wide["summary"]].map(|summary| summary.as_object().unwrap());
         let mut compared = 0;
         for (key, value) in plain {
@@ -154,7 +154,7 @@ fn other_views_score_what_they_did() {
 #[test]
 fn nearest_neighbours_fall_and_the_truth_does_not() {
     let psnr = |method: &str, key: &str| {
-        let summary = &result(&format!("wide-{method}"))["protocols"]["mateval-2"]["summary"];
+        let summary = &result(&format!("wide-{method}"))["protocols"]["mateval-3"]["summary"];
         summary[key].as_f64().unwrap_or_else(|| panic!("no {key}"))
     };
     for (picture, fall) in [("albedo", 1.0), ("rgb_true", 0.5)] {

@@ -5,7 +5,7 @@ echo "# Steps of the release"
 echo
 echo "| Step | Good | Failed | Passed over |"
 echo "|---|---|---|---|"
-for folder in "$1"/build "$1"/render "$1"/companions "$1"/compare "$1"/score/*; do
+for folder in "$1"/build "$1"/render "$1"/scorer "$1"/compare "$1"/score/*; do
     [ -d "$folder" ] || continue
     count() { grep -l "^$1" "$folder"/* | wc -l; }
     echo "| ${folder#"$1"/} | $(count good) | $(count failed) | $(count 'passed over') |"

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use mateval_scene::dataset::{DatasetFile, FORMAT};
-use mateval_scene::layout::{DATASET, MANIFEST, is_ground_truth};
+use mateval_scene::layout::{COMPARE, DATASET, MANIFEST, is_ground_truth};
 use mateval_scene::manifest::{self, Entry, sha256_of_bytes};
 use mateval_scene::open::check_whole;
 use mateval_scene::work_folder::{WorkFolder, check_holds_none};
@@ -44,6 +44,7 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     let commitment_sha256 = commitment_of(&withheld);
     let mut shown: Vec<&str> = shown.iter().map(|entry| entry.file.as_str()).collect();
     shown.extend([MANIFEST, DATASET]);
+    shown.extend(root.join(COMPARE).is_file().then_some(COMPARE));
     let withheld: Vec<&str> = withheld.iter().map(|entry| entry.file.as_str()).collect();
     let folders = [(public, &shown, "public folder"), (private, &withheld, "private folder")];
     let mut works = Vec::new();

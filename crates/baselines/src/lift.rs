@@ -78,7 +78,7 @@ pub struct PartialAtlas {
 /// let intrinsics = Intrinsics::from_fov_x(8, 8, 2.0 * f64::atan(0.5));
 /// let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
 /// let scene = serde_json::from_value(json!({
-///     "format": "mateval/2",
+///     "format": "mateval/3",
 ///     "id": "room",
 ///     "source": {
 ///         "kind": "bitterli", "house": "room", "states_roughness": true, "states_metallic": true, "files": []

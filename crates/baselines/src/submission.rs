@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_scene::dataset::{Instance, SceneFile};
+use mateval_scene::layout::is_rendered;
 use mateval_scene::open::Dataset;
 use mateval_scene::stored_encoding::StoredEncoding;
 use mateval_scene::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
@@ -71,7 +72,7 @@ pub fn write_scenes(
         // The submission names the dataset by its manifest, so the files that it is made from must match the manifest.
         // Where the ground truth is withheld, only public files are checked: what reads the truth reports its absence.
         let has_truth = dataset.folder(&scene.id).truth().exists();
-        let concerns = |path: &str| !path.contains("/renders/") && (has_truth || !path.starts_with("ground_truth/"));
+        let concerns = |path: &str| !is_rendered(path) && (has_truth || !path.starts_with("ground_truth/"));
         dataset.check_files(&scene.id, concerns)?;
         let folder = scene_folder(work.path(), &scene.id);
         std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;

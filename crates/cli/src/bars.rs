@@ -142,8 +142,8 @@ mod tests {
     fn a_label_keeps_the_count_and_cuts_the_name() {
         assert_eq!(label("hashes", None), "hashes");
         assert_eq!(label("scene room: relit", Some([3, 12])), "scene room: relit 3/12");
-        let long = label("scene sample-living-4: companions of true light", Some([100, 900]));
-        assert_eq!(long, "scene sample-living-4: companio… 100/900");
+        let long = label("scene sample-living-4: reference of turned views", Some([100, 900]));
+        assert_eq!(long, "scene sample-living-4: referenc… 100/900");
         assert_eq!(long.chars().count(), LABEL);
     }
 }

@@ -16,12 +16,14 @@ use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
 use mateval_baselines::{grey, homogeneous, truth};
-use mateval_eval::light_rules::Track;
+use mateval_eval::light::reference::{ReferenceOptions, make_references};
+use mateval_eval::light::rules::Track;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_metrics::Net;
 use mateval_prep::build::{BuildOptions, build};
+use mateval_prep::finish::finish_again;
 use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
 use mateval_report::leaderboard::results_folder::ResultsFolder;
 use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
@@ -38,7 +40,7 @@ use crate::tool::TOOL;
 use crate::weights;
 
 /// The protocol whose numbers are printed.
-const PROTOCOL: &str = "mateval-2";
+const PROTOCOL: &str = "mateval-3";
 
 /// A baseline of the demo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
@@ -99,9 +101,11 @@ pub struct Args {
 
 /// Steps from the sample to the leaderboard.
 const STEPS: u8 = 6;
-/// Samples per pixel of the leaderboard's lit pictures: two for their two halves at least, and few at most, since noise is
-/// filtered for display.
-const SHOWN_SAMPLES: std::ops::RangeInclusive<u32> = 2..=16;
+/// Samples per pixel of each half of the leaderboard's lit pictures: with fewer, the filter that takes out their noise would
+/// blur what the prediction adds to the reference.
+const SHOWN_SAMPLES: u32 = 16;
+/// Samples per pixel of each half of the scorer's reference: fewer than a release has, as befits its small views.
+const REFERENCE_SAMPLES: u32 = 32;
 /// Width and height of a view: large enough to look at, and rendered in seconds.
 const SMALL: [u32; 2] = [160, 120];
 const LARGE: [u32; 2] = [320, 240];
@@ -317,6 +321,12 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
         let failed = counted(report.failures.len(), "scene");
         bail!("{failed} could not be rendered; run the demo again to go on from here");
     }
+    let reference_options = ReferenceOptions { samples: REFERENCE_SAMPLES, scenes: Vec::new(), force: false };
+    let references = with_progress(|progress| make_references(&places.dataset, &reference_options, progress))
+        .context("cannot render the scorer's references")?;
+    if references.rendered > 0 {
+        with_progress(|progress| finish_again(&places.dataset, progress)).context("cannot finish the dataset")?;
+    }
     let (by, samples) = (options.renderer.name(), options.samples);
     let kept = if report.kept > 0 { format!(", {} kept", report.kept) } else { String::new() };
     let rendered = counted(report.rendered, "picture");
@@ -372,7 +382,6 @@ fn score_submissions(
         options.baselines.iter().copied().filter(|baseline| !places.result(*baseline).exists()).collect();
     if !missing.is_empty() {
         let submissions: Vec<PathBuf> = missing.iter().map(|baseline| places.submission(*baseline)).collect();
-        let companions = weights::cache_folder().join("companions");
         let plan = ScorePlan {
             dataset,
             submissions: submissions.iter().map(PathBuf::as_path).collect(),
@@ -383,11 +392,11 @@ fn score_submissions(
             jobs: 1,
             cache: Some(&places.scores),
             only_cached: false,
-            companion_cache: Some(&companions),
+            pictures: None,
         };
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
         for (result, baseline) in results.iter().zip(missing) {
-            json::write(&places.result(baseline), result)?;
+            json::write_lines(&places.result(baseline), result)?;
             say_warnings(&result.method, &result.findings);
         }
         work_folder::remove(&places.scores)?;
@@ -406,7 +415,7 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
     let (ranked, ceiling) = results_and_ceiling(places, options);
     let results = ranked.iter().map(|baseline| places.result(*baseline)).collect();
     let entries = entries::read(&ResultsFolder { results, ceiling, errata: None })?;
-    let samples = options.samples.clamp(*SHOWN_SAMPLES.start(), *SHOWN_SAMPLES.end()) / 2;
+    let samples = SHOWN_SAMPLES.min(options.samples);
     let plan = LeaderboardPlan {
         results: &entries.results,
         ceiling: entries.ceiling.as_ref(),

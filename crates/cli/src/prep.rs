@@ -2,7 +2,6 @@
 
 pub mod blender;
 pub mod build;
-mod companions;
 mod compare;
 mod export;
 mod finish;
@@ -23,14 +22,13 @@ pub enum Command {
     Build(build::BuildArgs),
     /// Searches 3D-FRONT houses for rooms that could become scenes, and writes a page to choose from and a recipe.
     Survey(survey::SurveyArgs),
-    /// Renders the dataset's RGB pictures.
+    /// Renders the photos that methods see, and the reference with which scores under light compare. Changes the manifest: run
+    /// it before the dataset is given to anyone.
     Render(render::RenderArgs),
     /// Writes the files that describe the whole dataset, after scenes were made or rendered apart by --scene.
     Finish(finish::FinishArgs),
-    /// Adds the pictures with which scoring corrects render noise, so that no user has to render them. Changes the manifest:
-    /// run it before the dataset is given to anyone.
-    Companions(companions::CompanionsArgs),
-    /// Compares Blender's pictures with those of the built-in path tracer. Exit code 1: they disagree.
+    /// Compares Blender's pictures with those of the built-in path tracer, and keeps the verdict in the dataset's compare.json,
+    /// which its identity does not cover. Exit code 1: they disagree.
     Compare(compare::CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
     Verify(verify::VerifyArgs),
@@ -55,7 +53,6 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Survey(args) => survey::run(args),
         Command::Render(args) => render::run(args),
         Command::Finish(args) => finish::run(args),
-        Command::Companions(args) => companions::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Perturb(args) => perturb::run(args),

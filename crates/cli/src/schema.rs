@@ -15,12 +15,13 @@ use mateval_release::ReleaseFile;
 use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::errata::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
-use mateval_scene::companions_file::CompanionsFile;
+use mateval_scene::compare_file;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
 use mateval_scene::material_class::MaterialClassesFile;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile, SourceMaterialsFile};
 use mateval_scene::render_file::RenderFile;
+use mateval_scene::scorer_file::ScorerFile;
 use mateval_scene::submission::SubmissionFile;
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
@@ -51,7 +52,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 25] {
+fn schemas() -> [(&'static str, Schema); 26] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -62,7 +63,7 @@ fn schemas() -> [(&'static str, Schema); 25] {
         ("material_classes", schema_for!(MaterialClassesFile)),
         ("render", schema_for!(RenderFile)),
         ("submission", schema_for!(SubmissionFile)),
-        ("companions", schema_for!(CompanionsFile)),
+        ("scorer", schema_for!(ScorerFile)),
         ("result", schema_for!(ResultFile)),
         ("explain", schema_for!(ExplainFile)),
         ("verification", schema_for!(VerificationFile)),
@@ -75,6 +76,7 @@ fn schemas() -> [(&'static str, Schema); 25] {
         ("blender_job", schema_for!(BlenderJob)),
         ("blender_result", schema_for!(BlenderResult)),
         ("compare", schema_for!(CompareFile)),
+        ("compare_verdict", schema_for!(compare_file::CompareFile)),
         ("encoding", schema_for!(EncodingReport)),
         ("import", schema_for!(ImportReport)),
         ("import_materials", schema_for!(FlatMaterials)),

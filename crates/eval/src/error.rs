@@ -14,7 +14,6 @@ pub enum EvalError {
     Io {
         /// What was tried, as in "read" or "write".
         action: &'static str,
-        /// The file.
         path: PathBuf,
         /// What the system reported.
         source: std::io::Error,
@@ -28,52 +27,56 @@ pub enum EvalError {
         /// The submissions and their scenes.
         missing: Vec<(PathBuf, Vec<SceneId>)>,
     },
-    /// The pictures of companions changed while they were read.
-    #[error("the companions in '{}' were changed or removed while they were in use; score again", path.display())]
-    CompanionsVanished {
-        /// Their folder.
-        path: PathBuf,
-    },
-    /// The dataset names no renderer whose pictures are scored.
-    #[error("the dataset '{}' has no renders that are scored; run `mateval prep render DATASET`", dataset.display())]
-    NoScoredRenderer {
-        /// Its folder.
+    /// A scene's reference under light cannot be used, or is missing.
+    #[error(
+        "the scorer's reference of scene '{scene}' in '{}' cannot be used: {what}; make it again: mateval prep render --only \
+         scorer --scene {scene} '{}', then mateval prep finish '{}'",
+        path.display(), dataset.display(), dataset.display()
+    )]
+    Reference {
+        /// Folder of the dataset.
         dataset: PathBuf,
+        scene: SceneId,
+        /// The folder of the reference.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
     },
+    /// A result states a number that does not follow from the others in it.
+    #[error("'{}': at {place} it states {said}, but its own numbers give {found}; it was changed by hand", path.display())]
+    Contradiction {
+        path: PathBuf,
+        place: String,
+        /// The number in the result.
+        said: String,
+        /// The number that follows.
+        found: String,
+    },
+    /// The dataset has no renders.
+    #[error("the dataset '{}' has no renders; run `mateval prep render DATASET`", dataset.display())]
+    NoPhotoRenderer { dataset: PathBuf },
     /// The scene has a photo from elsewhere, so it has no renders.
     #[error("scene '{scene}' has no renders: its input picture is a photo from elsewhere, whose light is not known")]
-    Photographed {
-        /// The scene.
-        scene: SceneId,
-    },
+    Photographed { scene: SceneId },
     /// No protocol has the name.
     #[error("cannot score: there is no protocol '{name}'; use one of: {}", known.join(", "))]
     UnknownProtocol {
-        /// The name.
         name: String,
         /// The names that exist.
         known: &'static [&'static str],
     },
     /// The protocol was removed.
-    #[error(
-        "cannot score: protocol '{name}' was removed before any release, because under it the true material did not always \
-         score best; use 'mateval-2'"
-    )]
-    RemovedProtocol {
-        /// The name.
-        name: String,
-    },
+    #[error("cannot score: protocol '{name}' was removed before any release, since {reason}; use 'mateval-3'")]
+    RemovedProtocol { name: String, reason: &'static str },
     /// A protocol was written for another version of the scorer.
     #[error(
         "cannot score: protocol '{protocol}' expects version {found} of the scorer, this is version {expected}; \
          use the protocols of this version"
     )]
     ScorerVersion {
-        /// The protocol's name.
         protocol: String,
         /// The version of this scorer.
         expected: u32,
-        /// The protocol's version.
         found: u32,
     },
     /// A protocol states a constant that the code does not have.
@@ -82,9 +85,7 @@ pub enum EvalError {
          change; use the protocols of this version"
     )]
     FixedRule {
-        /// The protocol's name.
         protocol: String,
-        /// The constant's name.
         rule: String,
         /// Its value in the code, as JSON.
         expected: String,
@@ -111,25 +112,16 @@ pub enum EvalError {
     },
     /// A scene has no input view.
     #[error("scene '{scene}': expected an input view, found none; run `mateval prep verify`")]
-    NoInputView {
-        /// The scene.
-        scene: SceneId,
-    },
+    NoInputView { scene: SceneId },
     /// `targets.json` lists no view of a scene.
     #[error("scene '{scene}': expected a view of it in targets.json, found none; run `mateval prep verify`")]
-    NoTargets {
-        /// The scene.
-        scene: SceneId,
-    },
+    NoTargets { scene: SceneId },
     /// `targets.json` lists views of a scene without its input view.
     #[error(
         "scene '{scene}': targets.json lists views without the input view, to which light is fitted; add it, or score \
          without light"
     )]
-    InputNotTarget {
-        /// The scene.
-        scene: SceneId,
-    },
+    InputNotTarget { scene: SceneId },
     /// An atlas has a size that the format does not allow.
     #[error(
         "'{}': the atlas of instance '{instance}' has {found} texels a side, expected {} to {}; run `mateval prep \
@@ -139,7 +131,6 @@ pub enum EvalError {
     AtlasSize {
         /// `scene.json`.
         path: PathBuf,
-        /// The instance.
         instance: InstanceId,
         /// The sizes that the format allows.
         expected: RangeInclusive<usize>,
@@ -152,7 +143,6 @@ pub enum EvalError {
         path.display(), found[0], found[1]
     )]
     TruthMapSize {
-        /// The map.
         path: PathBuf,
         /// Width and height of the atlas.
         expected: usize,
@@ -165,7 +155,6 @@ pub enum EvalError {
         expected[0], expected[1], found[0], found[1]
     )]
     TruthPictureSize {
-        /// The view.
         view: ViewId,
         /// Width and height of the camera's picture.
         expected: [usize; 2],
@@ -192,22 +181,14 @@ pub enum EvalError {
     Image(#[from] mateval_image::ImageError),
     /// Two pictures of a view could not be compared.
     #[error("scene '{scene}', view '{view}': {source}")]
-    Metric {
-        /// The scene.
-        scene: SceneId,
-        /// The view.
-        view: ViewId,
-        /// Why not.
-        source: mateval_metrics::MetricError,
-    },
+    Metric { scene: SceneId, view: ViewId, source: mateval_metrics::MetricError },
 }
 
 impl EvalError {
-    /// Whether the file system refused.
-    pub(crate) fn is_io(&self) -> bool {
-        use mateval_image::ImageError;
-        use mateval_scene::SceneError;
-        matches!(self, Self::Io { .. } | Self::Image(ImageError::Io { .. }) | Self::Dataset(SceneError::Io { .. }))
+    /// The error of an action on a path.
+    pub(crate) fn io(action: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self::Io { action, path, source }
     }
 }
 

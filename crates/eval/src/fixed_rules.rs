@@ -2,21 +2,21 @@
 //!
 //! Each value is taken from the constant that the code uses, so that what a result publishes cannot differ from what was
 //! computed. Constants of published definitions are not listed: sRGB's curve, Rec. 709's luminance, the weights and layers
-//! of LPIPS' network (whose hash is in the result). Nor are those of the path tracer, which estimates an integral that does
-//! not depend on them.
+//! of LPIPS' network (whose hash is in the result). Nor are constants of the path tracer that decide only which of many equal
+//! estimates of an integral a seed stands for; the scorer's version rises with them.
 
 use mateval_light::light_fit;
-use mateval_metrics::{Psnr, lpips, noise_free, ssim};
+use mateval_metrics::{Psnr, flip, lpips, ssim};
 use mateval_scene::submission::MAP_SIZES;
 use mateval_submission::{bad_texels, default_map, map_file, memory_budget, reach, texel_map};
-use mateval_tracer::noise_filter;
+use mateval_tracer::emitter::{self, group_shares};
+use mateval_tracer::{noise_filter, world};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::companions::COMPANION_SCALES;
-use crate::control_variate;
-use crate::metric::LPIPS_NET;
-use crate::shown_render;
+use crate::light::difference::{DIFFERENCE, DifferenceRules};
+use crate::light::error::ONE_SIDED_95;
+use crate::metric::{HALF_A_BYTE, LPIPS_NET};
 
 /// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -92,20 +92,20 @@ pub struct FixedRules {
     pub shown_deviations: f32,
     /// The least cosine between the normals of pixels that it averages.
     pub shown_least_cosine: f32,
-    /// The least base colour that it divides light by.
-    pub shown_least_base_color: f32,
-    /// The largest ratio of base colours by which the truth's picture is multiplied before the rest is filtered.
-    pub shown_most_ratio: f32,
-    /// The factors of the companions' base colours.
-    pub companion_scales: Vec<f32>,
-    /// The largest ratio of a prediction's base colour to the truth's by which companions are multiplied.
-    pub companion_most_ratio: f32,
-    /// The smallest base colour of the truth that a prediction's is divided by.
-    pub companion_least_base_color: f32,
-    /// Share of the trace that is added to the diagonal of the normal equations of the companions' coefficients.
-    pub companion_ridge: f64,
-    /// The range of exposed values whose slope of the sRGB curve weighs a pixel in these equations.
-    pub companion_weighed_range: [f64; 2],
+    /// The weights of that filter along a row or column, by distance.
+    pub shown_kernel: [f32; 4],
+    /// The smallest share of the light samples that a light group gets.
+    pub least_group_share: f64,
+    /// The share of the light samples that is drawn without regard to distance.
+    pub uniform_light_share: f32,
+    /// The number of places along each side of the input view by which the shares of groups are set.
+    pub group_probes: u32,
+    /// The constants of the difference of light.
+    pub difference: DifferenceRules,
+    /// A difference of roughness or metallic of at most this counts as none.
+    pub scalar_tolerance: f32,
+    /// Pixels a degree at which FLIP looks at pictures.
+    pub flip_pixels_per_degree: f64,
 }
 
 impl FixedRules {
@@ -130,7 +130,7 @@ impl FixedRules {
             most_scene_bytes: memory_budget::MAX_SCENE_BYTES,
             predicted_specular: mateval_tracer::repaint::SPECULAR,
             psnr_cap_db: Psnr::CAP_DB,
-            lower_bound_standard_errors: noise_free::ONE_SIDED_95,
+            lower_bound_standard_errors: ONE_SIDED_95,
             ssim_window: ssim::WINDOW,
             ssim_sigma: ssim::SIGMA,
             ssim_k1: ssim::K1,
@@ -148,13 +148,13 @@ impl FixedRules {
             shown_passes: noise_filter::PASSES,
             shown_deviations: noise_filter::DEVIATIONS,
             shown_least_cosine: noise_filter::LEAST_COSINE,
-            shown_least_base_color: noise_filter::LEAST_BASE_COLOR,
-            shown_most_ratio: shown_render::MOST_RATIO,
-            companion_scales: COMPANION_SCALES.to_vec(),
-            companion_most_ratio: control_variate::MOST_RATIO,
-            companion_least_base_color: control_variate::LEAST_BASE_COLOR,
-            companion_ridge: control_variate::RIDGE,
-            companion_weighed_range: control_variate::WEIGHED_RANGE,
+            shown_kernel: noise_filter::KERNEL,
+            least_group_share: group_shares::LEAST_SHARE,
+            uniform_light_share: emitter::UNIFORM_SHARE,
+            group_probes: world::PROBES,
+            difference: DIFFERENCE,
+            scalar_tolerance: HALF_A_BYTE,
+            flip_pixels_per_degree: flip::PIXELS_PER_DEGREE,
         }
     }
 

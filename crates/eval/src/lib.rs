@@ -5,69 +5,38 @@
 //!
 //! [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those that they may not. For each scene of
 //! the dataset, [`score()`](score::score) reads the submissions' maps
-//! ([`read_scene`](mateval_submission::prediction::read_scene)), and `scene_scorer` takes three steps:
+//! ([`read_scene`](mateval_submission::prediction::read_scene)), and `scene_score` takes three steps:
 //!
 //! 1. `material_score` looks up the maps in every view ([`material_pictures`]), removes their scale ([`alignment`]) and
 //!    compares the pictures with the truth's ([`measure`]).
-//! 2. It compares the maps texel by texel ([`texture_space`]).
-//! 3. `light_score` renders the maps under every light (`predicted_light`) and compares the renders ([`rgb`]).
+//! 2. [`light`] renders the maps under every light and compares the renders with the scorer's own render of the true maps.
+//! 3. `material_score` compares the maps texel by texel ([`texture_space`]).
 //!
-//! [`dataset_companions`] makes the pictures with which the third step corrects render noise part of a dataset.
-//!
-//! Scores stay nested by scene, view and picture until `result_writer` lists each value by its key ([`result_key`]) and
-//! takes the means ([`means`]): pictures to scenes, scenes to the dataset.
+//! A [`result`] lists every value by scene, view and picture, with its key ([`result_key`]), and their means ([`means`]):
+//! pictures to scenes, scenes to the dataset.
 
 pub mod alignment;
-mod batch_mixes;
-pub mod companion_pictures;
-mod companion_store;
-mod companions;
-pub mod control_variate;
-pub mod dataset_companions;
 pub mod error;
-mod fitted_mixes;
-pub mod fitted_radiances;
 pub mod fixed_rules;
-pub mod instance_errors;
-mod light_pass;
-pub mod light_rules;
-mod light_score;
-mod lit_scene;
+pub mod light;
 pub mod mask_rule;
 pub mod material_pictures;
 mod material_score;
 pub mod means;
 pub mod measure;
 pub mod metric;
-pub mod noise_blocks;
 pub mod open_scene;
-pub mod pilot;
-mod pilot_view;
-mod predicted_light;
+pub mod pictures_dir;
 pub mod protocol;
-mod reference_features;
-pub mod relit;
-pub mod rendered_view;
 pub mod result;
 pub mod result_key;
-mod result_writer;
-pub mod rgb;
 mod scene_score;
-mod scene_scorer;
 mod scene_task;
 pub mod score;
-mod seeds;
-pub mod shown_render;
 pub mod shown_scene;
-mod stored_light;
 pub mod texture_space;
 pub mod truth;
-pub mod truth_material;
-mod truth_noise;
-#[cfg(test)]
-mod unbiased_tests;
 pub mod verify;
-mod view_set;
 pub mod word_enum;
 
 pub use error::EvalError;

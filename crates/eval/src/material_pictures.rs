@@ -2,10 +2,12 @@
 
 use std::cell::LazyCell;
 
-use glam::{DVec2, Vec2};
+use glam::Vec2;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, TriangleMesh};
-use mateval_tracer::aov::{COARSE_SUBPIXELS, PixelMean, SUBPIXELS, coarse_subpixels, places_through, subpixel};
+use mateval_tracer::aov::{
+    COARSE_SUBPIXELS, PixelMean, SUBPIXELS, appearance, coarse_subpixels, flatness_values, places_through, subpixel,
+};
 use mateval_tracer::{Hit, World};
 use rayon::prelude::*;
 
@@ -26,15 +28,16 @@ pub struct MaterialPictures {
 type Values = [f32; 5];
 
 /// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a predicted
-/// material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's pictures. Rays
-/// are traced once for all submissions.
+/// material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's pictures: whether a
+/// few of them or all are looked at is decided by the world's own materials, for all submissions alike. Rays are traced once
+/// for all.
 ///
 /// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces.
 pub fn material_pictures(
     world: &World,
     atlases: &[TriangleMesh],
     camera: &Camera,
-    submissions: &[PredictedScene],
+    submissions: &[&PredictedScene],
 ) -> Vec<MaterialPictures> {
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
     let rows: Vec<Vec<Vec<Values>>> =
@@ -57,23 +60,36 @@ fn picture_row(
     world: &World,
     atlases: &[TriangleMesh],
     camera: &Camera,
-    submissions: &[PredictedScene],
+    submissions: &[&PredictedScene],
     width: usize,
     y: usize,
 ) -> Vec<Vec<Values>> {
-    let lookups = |places: &mut dyn Iterator<Item = DVec2>| -> Vec<Option<Lookup>> {
-        places_through(world, camera, places).into_iter().map(|hit| Lookup::of(&hit?, atlases)).collect()
-    };
-    let coarse = lookups(&mut (0..width).flat_map(|x| coarse_subpixels(x, y)));
+    let coarse = places_through(world, camera, (0..width).flat_map(|x| coarse_subpixels(x, y)));
     let mut rows = vec![Vec::with_capacity(width); submissions.len()];
     for (x, coarse) in coarse.chunks_exact(COARSE_SUBPIXELS).enumerate() {
-        let others = LazyCell::new(|| lookups(&mut (COARSE_SUBPIXELS..SUBPIXELS).map(|at| subpixel(x, y, at))));
-        let lookup = |at: usize| at.checked_sub(COARSE_SUBPIXELS).map_or_else(|| coarse[at], |rest| others[rest]);
+        let others =
+            LazyCell::new(|| places_through(world, camera, (COARSE_SUBPIXELS..SUBPIXELS).map(|at| subpixel(x, y, at))));
+        let hit = |at: usize| at.checked_sub(COARSE_SUBPIXELS).map_or_else(|| coarse[at], |rest| others[rest]);
+        let truth = PixelMean::of(|at| {
+            let hit = hit(at)?;
+            Some(flatness_values(&appearance(world, hit.surface, hit.triangle.0, hit.barycentrics)?))
+        });
+        let places: Vec<Lookup> = (0..truth.looked).filter_map(|at| Lookup::of(&hit(at)?, atlases)).collect();
         for (row, submission) in rows.iter_mut().zip(submissions) {
-            row.push(PixelMean::of(|at| values(submission, lookup(at)?)).mean);
+            row.push(mean_of(places.iter().filter_map(|place| values(submission, *place))));
         }
     }
     rows
+}
+
+/// The mean of the values; 0 without any.
+fn mean_of(all: impl Iterator<Item = Values>) -> Values {
+    let (mut sum, mut count) = ([0.0_f64; 5], 0_usize);
+    for values in all {
+        sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += f64::from(value));
+        count += 1;
+    }
+    sum.map(|sum| if count == 0 { 0.0 } else { (sum / count as f64) as f32 })
 }
 
 /// Where a sub-pixel looks a submission up.

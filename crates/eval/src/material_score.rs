@@ -3,19 +3,21 @@
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Report;
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::submission::Map;
+use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
 use crate::alignment::{channel_scales, scaled};
 use crate::error::EvalError;
-use crate::instance_errors::InstanceErrors;
+use crate::light::true_maps::true_maps;
 use crate::material_pictures::{MaterialPictures, material_pictures};
-use crate::measure::{Albedo, AlbedoReference, albedo_metrics, scalar_metrics, unstated_scalar_metrics};
+use crate::measure::{Albedo, AlbedoReference, measure_albedo, measure_scalar};
+use crate::metric::Metric;
 use crate::protocol::{AlbedoSpace, Protocol};
-use crate::result::{InstanceTexelErrors, TexelErrors};
-use crate::result_key::{PictureKind, Region, Views};
-use crate::scene_score::{PictureScore, ScoreSheet};
-use crate::scene_task::{MaskedRegion, SceneTask, regions};
+use crate::result::{InstanceTexelErrors, PictureValues, TexelErrors};
+use crate::result_key::{PictureKind, Region, Surfaces, Views};
+use crate::scene_score::InstanceErrors;
+use crate::scene_score::ScoreSheet;
+use crate::scene_task::{BaseColors, MaskedRegion, SceneTask, regions};
 use crate::texture_space::{InstanceTexels, TexelSums, texture_space};
 use crate::truth::ViewTruth;
 
@@ -43,34 +45,63 @@ struct Truth<'a> {
     regions: Vec<MaskedRegion>,
 }
 
+/// Gets a view, its number, the pictures of every submission and the base colour of the true atlases.
+type EachView<'a> = dyn FnMut(&View, usize, &[MaterialPictures], &Picture<LinearRgb>) -> Result<(), EvalError> + 'a;
+
 impl SceneTask<'_> {
-    /// Pictures of base colour, roughness and metallic. Returns the base colours of each submission, by view.
+    /// Pictures of base colour, roughness and metallic, under the protocols that are `wanted` by their numbers. Returns the base
+    /// colours of the true atlases and of each submission.
     pub(crate) fn score_materials(
         &self,
         truths: &[ViewTruth],
+        wanted: &(impl Fn(usize) -> bool + Sync),
         sheets: &mut [Vec<ScoreSheet>],
-    ) -> Result<Vec<Vec<Picture<LinearRgb>>>, EvalError> {
-        let mut base_colors: Vec<Vec<Picture<LinearRgb>>> = vec![Vec::new(); self.predictions.len()];
-        for (at, (view, truth)) in self.views.iter().zip(truths).enumerate() {
-            (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
-            let pictures = material_pictures(self.world, self.atlases, &view.camera, self.predictions);
+    ) -> Result<BaseColors, EvalError> {
+        self.each_view(&mut |view, at, pictures, true_base_color| {
+            for (kept, (submission, pictures)) in
+                self.pictures.into_iter().flat_map(|kept| pictures.iter().enumerate().map(move |at| (kept, at)))
+            {
+                kept.keep_maps(submission, (&self.scene.id, &view.id), pictures, true_base_color)?;
+            }
+            let truth = &truths[at];
             let predicted: Vec<Predicted> =
-                pictures.into_par_iter().map(|pictures| Predicted::new(pictures, truth)).collect();
+                pictures.par_iter().map(|pictures| Predicted::new(pictures.clone(), truth)).collect();
             let albedo = AlbedoReference::new(truth.albedo.clone());
             let truth = Truth { view: truth, albedo, regions: regions(truth) };
-            let jobs: Vec<(usize, usize)> =
-                (0..sheets.len()).flat_map(|s| (0..self.protocols.len()).map(move |p| (s, p))).collect();
+            let protocols = (0..self.protocols.len()).filter(|&p| wanted(p));
+            let jobs: Vec<(usize, usize)> = protocols.flat_map(|p| (0..sheets.len()).map(move |s| (s, p))).collect();
             let measured: Vec<_> = jobs
                 .par_iter()
                 .map(|&(s, p)| self.material_values(&self.protocols[p], view, &predicted[s], &truth))
                 .collect();
             for ((s, p), values) in jobs.into_iter().zip(measured) {
                 let sheet = &mut sheets[s][p];
-                sheet.score.add(&view.id, values?);
+                sheet.score.pictures.extend(values?);
                 self.material_errors(&self.protocols[p], view, &predicted[s], &truth, &mut sheet.errors);
             }
-            for (base_colors, predicted) in base_colors.iter_mut().zip(predicted) {
-                base_colors.push(predicted.pictures.base_color);
+            Ok(())
+        })
+    }
+
+    /// The base colours of the true atlases and of each submission, in every view.
+    pub(crate) fn base_colors(&self) -> Result<BaseColors, EvalError> {
+        self.each_view(&mut |_, _, _, _| Ok(()))
+    }
+
+    /// Looks all maps up in every view; `each` gets the submissions' pictures and the base colour of the true atlases.
+    fn each_view(&self, each: &mut EachView<'_>) -> Result<BaseColors, EvalError> {
+        let blank = vec![Vec::new(); self.predictions.len()];
+        let mut base_colors = BaseColors { truth: Vec::new(), predicted: blank };
+        let true_maps = true_maps(self.folder, self.scene)?;
+        let all: Vec<&PredictedScene> = self.predictions.iter().chain([&true_maps]).collect();
+        for (at, view) in self.views.iter().enumerate() {
+            (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
+            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all);
+            let truth = pictures.pop().expect("the truth comes last").base_color;
+            each(view, at, &pictures, &truth)?;
+            base_colors.truth.push(truth);
+            for (base_colors, pictures) in base_colors.predicted.iter_mut().zip(pictures) {
+                base_colors.push(pictures.base_color);
             }
         }
         Ok(base_colors)
@@ -84,28 +115,36 @@ impl SceneTask<'_> {
         view: &View,
         predicted: &Predicted,
         truth: &Truth<'_>,
-    ) -> Result<Vec<PictureScore>, EvalError> {
-        let mut values = Vec::new();
+    ) -> Result<Vec<PictureValues>, EvalError> {
+        let mut all = Vec::new();
+        let Predicted { pictures, albedos } = predicted;
         for region in &truth.regions {
-            for (kind, albedo) in &predicted.albedos {
-                let found = albedo_metrics(protocol, self.lpips, albedo, &truth.albedo, &region.mask);
-                values.push(region.score(*kind, None, self.locate_error(view, found)?));
+            let (mask, whole) = (&region.mask, region.is_whole());
+            let blank = |kind| region.values(&self.scene.id, &view.id, kind, None);
+            if region.surfaces == Surfaces::All {
+                for (kind, albedo) in albedos {
+                    let mut values = blank(*kind);
+                    let found = measure_albedo(protocol, self.lpips, albedo, &truth.albedo, mask, whole, &mut values);
+                    self.locate_error(view, found)?;
+                    all.push(values);
+                }
             }
-            let Predicted { pictures, .. } = predicted;
             let source = &self.scene.source;
             let scalars = [
                 (PictureKind::Roughness, source.states_roughness, &pictures.roughness, &truth.view.roughness),
                 (PictureKind::Metallic, source.states_metallic, &pictures.metallic, &truth.view.metallic),
             ];
-            for (kind, is_stated, picture, truth) in scalars {
-                let found = match is_stated {
-                    true => self.locate_error(view, scalar_metrics(protocol, picture, truth, &region.mask))?,
-                    false => unstated_scalar_metrics(),
-                };
-                values.push(region.score(kind, None, found));
+            for (kind, _, picture, truth) in scalars.into_iter().filter(|(_, is_stated, ..)| *is_stated) {
+                let mut values = blank(kind);
+                self.locate_error(view, measure_scalar(picture, truth, mask, &mut values))?;
+                if region.surfaces == Surfaces::Specular {
+                    // One number is enough to say how far off mirrors and metals are.
+                    values.values.remove(&Metric::Mse);
+                }
+                all.push(values);
             }
         }
-        Ok(values)
+        Ok(all)
     }
 
     /// Adds the squared errors of raw and aligned albedo to the sums by instance.
@@ -133,7 +172,15 @@ impl SceneTask<'_> {
 
     /// Errors of texels; they are the same under every protocol.
     pub(crate) fn score_texels(&self, sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
-        let found = texture_space(self.folder, self.scene, self.world, self.atlases, self.predictions, self.progress)?;
+        let found = texture_space(
+            self.folder,
+            self.scene,
+            self.world,
+            self.atlases,
+            self.predictions,
+            self.pictures,
+            self.progress,
+        )?;
         for (sheets, instances) in sheets.iter_mut().zip(found) {
             let errors: Vec<InstanceTexelErrors> =
                 instances.iter().map(|instance| texel_errors(self.scene, instance)).collect();
@@ -150,14 +197,7 @@ fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
 }
 
 fn texel_errors(scene: &SceneFile, instance: &InstanceTexels) -> InstanceTexelErrors {
-    // A constant of the source's reader is no truth to compare with.
-    let stated = |is_stated: bool, mse: Option<f64>| mse.filter(|_| is_stated);
-    let errors = |sums: &TexelSums| TexelErrors {
-        area_m2: sums.area_m2,
-        base_color_mse: sums.mse(Map::BaseColor),
-        roughness_mse: stated(scene.source.states_roughness, sums.mse(Map::Roughness)),
-        metallic_mse: stated(scene.source.states_metallic, sums.mse(Map::Metallic)),
-    };
+    let errors = |sums: &TexelSums| TexelErrors { area_m2: sums.area_m2, base_color_mse: sums.mse() };
     InstanceTexelErrors {
         scene: scene.id.clone(),
         instance: instance.instance.clone(),

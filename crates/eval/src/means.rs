@@ -1,24 +1,30 @@
-//! Means of a result: of pictures to scenes, of scenes to the dataset.
+//! Means of a result, of pictures to scenes and of scenes to the dataset, when it is made and again when it is read.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use mateval_metrics::Psnr;
-use mateval_scene::SceneId;
+use mateval_scene::submission::Map;
+use mateval_scene::{SceneId, json};
 
+use crate::error::EvalError;
 use crate::metric::Metric;
-use crate::result::{InstanceTexelErrors, PictureValue, PsnrNoise, TexelErrors};
+use crate::protocol::Protocol;
+use crate::result::{InstanceTexelErrors, PictureValues, ProtocolResult, RESULT_FORMAT, ResultFile};
 use crate::result_key::{PictureKind, ResultKey, Views};
+use crate::scene_score::SceneScore;
+use crate::verify::differences::{Difference, differences};
 
 /// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over its
 /// scenes. A mean skips missing values; the dataset's mean of a key skips scenes without a value of that key.
 pub fn means(
-    pictures: &[PictureValue],
+    pictures: &[PictureValues],
     texels: &[InstanceTexelErrors],
 ) -> (BTreeMap<SceneId, BTreeMap<ResultKey, f64>>, BTreeMap<ResultKey, f64>) {
     let mut of_scene: BTreeMap<SceneId, BTreeMap<ResultKey, Mean>> = BTreeMap::new();
     for picture in pictures {
-        if let Some(value) = picture.value {
-            of_scene.entry(picture.scene.clone()).or_default().entry(picture.key()).or_default().add(value);
+        for (metric, value) in &picture.values {
+            of_scene.entry(picture.scene.clone()).or_default().entry(picture.key(*metric)).or_default().add(*value);
         }
     }
     let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = of_scene
@@ -36,26 +42,16 @@ pub fn means(
     (scenes, summary)
 }
 
-/// For each scene and map, of observed and of unobserved texels: the mean squared error weighted by area, and its PSNR.
+/// For each scene, of observed and of unobserved texels: the mean squared error weighted by area, and its PSNR.
 fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<ResultKey, f64>> {
-    type Part = (Views, fn(&InstanceTexelErrors) -> &TexelErrors);
-    type Map = (PictureKind, fn(&TexelErrors) -> Option<f64>);
-    let parts: [Part; 2] = [(Views::Observed, |t| &t.observed), (Views::Unobserved, |t| &t.unobserved)];
-    let maps: [Map; 3] = [
-        (PictureKind::TextureBaseColor, |errors| errors.base_color_mse),
-        (PictureKind::TextureRoughness, |errors| errors.roughness_mse),
-        (PictureKind::TextureMetallic, |errors| errors.metallic_mse),
-    ];
     let mut sums: BTreeMap<(SceneId, ResultKey), [f64; 2]> = BTreeMap::new();
     for instance in texels {
-        for (part, errors) in parts.map(|(part, of)| (part, of(instance))) {
-            for (map, mse) in maps.map(|(map, of)| (map, of(errors))) {
-                let Some(mse) = mse else { continue };
-                let key = ResultKey::whole(map, part, Metric::Mse);
-                let sums = sums.entry((instance.scene.clone(), key)).or_default();
-                sums[0] += errors.area_m2 * mse;
-                sums[1] += errors.area_m2;
-            }
+        for (views, errors) in [(Views::Observed, &instance.observed), (Views::Unobserved, &instance.unobserved)] {
+            let Some(mse) = errors.base_color_mse else { continue };
+            let key = ResultKey::whole(PictureKind::TextureBaseColor, views, Metric::Mse);
+            let sums = sums.entry((instance.scene.clone(), key)).or_default();
+            sums[0] += errors.area_m2 * mse;
+            sums[1] += errors.area_m2;
         }
     }
     let mut means: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
@@ -70,16 +66,79 @@ fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<Res
     means
 }
 
-/// The standard error of the dataset's mean of each key. A key is left out if one of its scenes has no standard error. The
-/// noise of different scenes is independent.
-pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>) -> BTreeMap<ResultKey, f64> {
-    let mut sums: BTreeMap<ResultKey, (usize, Option<f64>)> = BTreeMap::new();
-    for (key, of_scene) in noise.values().flatten() {
-        let (count, squares) = sums.entry(*key).or_insert((0, Some(0.0)));
+/// The standard error of the dataset's mean of each key, where every scene with a value has one. The noise of different
+/// scenes is independent. `scenes` are the scenes' means.
+pub(crate) fn summary_noise(
+    noise: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
+    scenes: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
+) -> BTreeMap<ResultKey, f64> {
+    let mut sums: BTreeMap<ResultKey, (usize, f64)> = BTreeMap::new();
+    for (key, error) in noise.values().flatten() {
+        let (count, squares) = sums.entry(*key).or_default();
         *count += 1;
-        *squares = squares.zip(of_scene.standard_error_db).map(|(sum, error)| sum + error * error);
+        *squares += error * error;
     }
-    sums.into_iter().filter_map(|(key, (count, squares))| Some((key, squares?.sqrt() / count as f64))).collect()
+    let valued = |key: &ResultKey| scenes.values().filter(|values| values.contains_key(key)).count();
+    let whole = sums.into_iter().filter(|(key, (count, _))| *count == valued(key));
+    whole.map(|(key, (count, squares))| (key, squares.sqrt() / count as f64)).collect()
+}
+
+impl ResultFile {
+    /// Reads a result; fails where it has another format, is not valid, holds a number that this version does not know, or a
+    /// mean that is not that of its own numbers.
+    pub fn read(path: &Path) -> Result<Self, EvalError> {
+        let result: Self = json::read_format(path, RESULT_FORMAT)?;
+        match result.contradiction()? {
+            None => Ok(result),
+            Some(Difference { place, said, found }) => {
+                Err(EvalError::Contradiction { path: path.to_owned(), place, said, found })
+            }
+        }
+    }
+
+    /// The first mean that does not follow from the numbers below it: pictures to scenes, scenes to the summary.
+    fn contradiction(&self) -> Result<Option<Difference>, EvalError> {
+        for (name, scores) in &self.protocols {
+            let (scenes, summary) = means(&scores.pictures, &scores.texels);
+            let noise = summary_noise(&scores.noise, &scenes);
+            let value = |value: serde_json::Result<serde_json::Value>| value.map_err(EvalError::Compare);
+            let said = value(serde_json::to_value((&scores.scenes, &scores.summary, &scores.summary_noise)))?;
+            let found = value(serde_json::to_value((&scenes, &summary, &noise)))?;
+            if let Some(first) = differences(&said, &found).into_iter().next() {
+                let (at, rest) = first.place[1..].split_at(1);
+                let part = ["scenes", "summary", "summary_noise"][at.parse::<usize>().unwrap_or(0)];
+                return Ok(Some(Difference { place: format!("/protocols/{name}/{part}{rest}"), ..first }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl ProtocolResult {
+    /// The scores of one submission under one protocol, scene by scene, without those of maps that it does not predict.
+    pub(crate) fn new(
+        protocol: &Protocol,
+        fingerprint: String,
+        scores: Vec<(SceneId, SceneScore)>,
+        not_predicted: &[Map],
+    ) -> Self {
+        let has_value = |kind: PictureKind| kind.map().is_none_or(|map| !not_predicted.contains(&map));
+        let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
+        for (scene, score) in scores {
+            pictures.extend(score.pictures.into_iter().filter(|picture| has_value(picture.picture.kind)));
+            texels.extend(score.texels.into_iter().filter(|_| has_value(PictureKind::TextureBaseColor)));
+            instances.extend(score.instances.into_iter().filter(|errors| has_value(errors.picture)));
+            if !score.noise.is_empty() {
+                noise.insert(scene.clone(), score.noise);
+            }
+            fits.extend(score.fit.map(|fit| (scene, fit)));
+        }
+        let (scenes, summary) = means(&pictures, &texels);
+        let summary_noise = summary_noise(&noise, &scenes);
+        let protocol = protocol.clone();
+        Self { protocol, fingerprint, summary, scenes, summary_noise, noise, fits, pictures, texels, instances }
+    }
 }
 
 #[derive(Default)]
@@ -104,25 +163,25 @@ mod tests {
     use mateval_scene::{InstanceId, ViewId};
 
     use super::*;
-    use crate::result::NoiseState;
+    use crate::result::TexelErrors;
     use crate::result_key::{PictureName, Region};
 
     fn key(text: &str) -> ResultKey {
         text.parse().unwrap()
     }
 
-    fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValue {
-        PictureValue {
+    fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValues {
+        PictureValues {
             scene: SceneId::new(scene).unwrap(),
             view: ViewId::new(view).unwrap(),
             picture: PictureName::whole(PictureKind::Albedo),
-            region,
-            metric: Metric::Psnr,
             lighting: None,
-            noise: None,
-            value,
+            region,
+            pixels: 1,
+            values: value.map(|value| (Metric::Psnr, value)).into_iter().collect(),
+            mse_error: None,
             exact: false,
-            count: 1,
+            lower_bound: false,
         }
     }
 
@@ -132,7 +191,7 @@ mod tests {
         let texels = |name: &str, area_m2: f64, mse: f64| InstanceTexelErrors {
             scene: SceneId::new("a").unwrap(),
             instance: InstanceId::new(name).unwrap(),
-            observed: TexelErrors { area_m2, base_color_mse: Some(mse), ..Default::default() },
+            observed: TexelErrors { area_m2, base_color_mse: Some(mse) },
             unobserved: TexelErrors::default(),
         };
         let (scenes, summary) = means(&[], &[texels("x", 1.0, 0.04), texels("y", 3.0, 0.0)]);
@@ -141,22 +200,15 @@ mod tests {
         assert_eq!(scenes.values().next().map(BTreeMap::len), Some(2));
     }
 
+    /// Without the error of one scene, that of the mean is not known.
     #[test]
     fn noise_of_scenes_is_independent() {
-        let noise = |error: Option<f64>| PsnrNoise {
-            standard_error_db: error,
-            own_db: error,
-            companions_db: None,
-            truth_db: None,
-            fit_db: None,
-            samples: 16,
-            state: NoiseState::Certified,
-        };
         let key = key("rgb_true.input.psnr");
-        let scene = |name: &str, error| (SceneId::new(name).unwrap(), BTreeMap::from([(key, noise(error))]));
-        let both = BTreeMap::from([scene("a", Some(0.03)), scene("b", Some(0.04))]);
-        assert!((summary_noise(&both)[&key] - 0.025).abs() < 1e-15);
-        assert!(summary_noise(&BTreeMap::from([scene("a", Some(0.1)), scene("b", None)])).is_empty());
+        let scene = |name: &str, error| (SceneId::new(name).unwrap(), BTreeMap::from([(key, error)]));
+        let scenes = BTreeMap::from([scene("a", 20.0), scene("b", 25.0)]);
+        let both = BTreeMap::from([scene("a", 0.03), scene("b", 0.04)]);
+        assert!((summary_noise(&both, &scenes)[&key] - 0.025).abs() < 1e-15);
+        assert!(summary_noise(&BTreeMap::from([scene("a", 0.1)]), &scenes).is_empty());
     }
 
     /// Scene a has two novel views, scene b one: each scene weighs the same.

@@ -29,18 +29,24 @@ impl Better {
 word_enum! {
     /// A kind of score: the last word of a result's key.
     Metric, a "metric":
-    /// Mean squared error.
     Mse = "mse",
+    Mae = "mae",
     /// Peak signal-to-noise ratio, in dB.
     Psnr = "psnr",
-    /// Structural similarity.
     Ssim = "ssim",
-    /// LPIPS by AlexNet.
     LpipsAlex = "lpips_alex",
+    /// NVIDIA's LDR-FLIP, at 67 pixels a degree.
+    Flip = "flip",
+    /// CIEDE2000, the mean over pixels.
+    DeltaE = "delta_e",
 }
 
 /// The network of [`Metric::LpipsAlex`].
 pub const LPIPS_NET: Net = Net::Alex;
+
+/// A difference of roughness or metallic of at most this counts as none: half a byte's step, which no file of bytes can
+/// avoid (0.5 is stored as 128 of 255), and a hundredth of that for rounding.
+pub const HALF_A_BYTE: f32 = 0.505 / 255.0;
 
 /// How a number is displayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,10 +67,9 @@ impl NumberStyle {
 }
 
 impl Metric {
-    /// The better direction.
     pub const fn better(self) -> Better {
         match self {
-            Self::Mse | Self::LpipsAlex => Better::Lower,
+            Self::Mse | Self::Mae | Self::LpipsAlex | Self::Flip | Self::DeltaE => Better::Lower,
             Self::Psnr | Self::Ssim => Better::Higher,
         }
     }
@@ -73,17 +78,20 @@ impl Metric {
     pub const fn style(self) -> NumberStyle {
         match self {
             Self::Mse => NumberStyle { title: "MSE (1e-3)", scale: 1e3, digits: 3 },
+            Self::Mae => NumberStyle { title: "MAE", scale: 1.0, digits: 4 },
             Self::Psnr => NumberStyle { title: "PSNR", scale: 1.0, digits: 2 },
             Self::Ssim => NumberStyle { title: "SSIM", scale: 1.0, digits: 4 },
             Self::LpipsAlex => NumberStyle { title: "LPIPS", scale: 1.0, digits: 4 },
+            Self::Flip => NumberStyle { title: "FLIP", scale: 1.0, digits: 4 },
+            Self::DeltaE => NumberStyle { title: "CIEDE2000", scale: 1.0, digits: 3 },
         }
     }
 
     /// The largest difference of a value between two processors: the last digits of LPIPS depend on them.
     pub const fn tolerance(self) -> f64 {
         match self {
-            Self::Mse | Self::Psnr | Self::Ssim => 0.0,
             Self::LpipsAlex => 1e-5,
+            _ => 0.0,
         }
     }
 }

@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use mateval_scene::companions_file::is_rendered;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
+use mateval_scene::layout::is_rendered;
 use mateval_scene::open::Dataset;
-use mateval_scene::render_file::RENDER_FILE;
 use mateval_scene::{RendererId, SceneError, TriangleMesh, glb, reference_io};
 use mateval_tracer::World;
 
@@ -23,9 +22,32 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
     Ok(views)
 }
 
+/// A set of views that are rendered together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ViewSet {
+    /// The input view, and those that are it turned: they share their paths.
+    Turned,
+    /// Views from other places.
+    Wide,
+}
+
+impl ViewSet {
+    /// The views of the set; empty where there are none.
+    pub(crate) fn of<'a>(self, views: &[&'a View]) -> Vec<&'a View> {
+        views.iter().filter(|view| view.id.is_wide() == (self == Self::Wide)).copied().collect()
+    }
+
+    /// The name of a pass over the set, part of its seeds.
+    pub(crate) fn pass(self, name: &str) -> String {
+        match self {
+            Self::Turned => name.to_owned(),
+            Self::Wide => format!("{name}_wide"),
+        }
+    }
+}
+
 /// A scene, opened for scoring.
 pub struct OpenScene {
-    /// Its folder.
     pub folder: SceneFolder,
     /// Its true geometry, materials and lights, ready for ray tracing.
     pub world: World,
@@ -34,25 +56,24 @@ pub struct OpenScene {
 }
 
 impl OpenScene {
-    /// Fails if a file differs from the dataset's manifest or does not fit the others. `renderer` is the one whose pictures
-    /// will be read.
-    pub fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
-        let render = renderer.map(|renderer| format!("ground_truth/renders/{renderer}/"));
-        let is_light = |file: &str| {
-            let name = file.rsplit('/').next().unwrap_or(file);
-            render.as_ref().is_some_and(|render| file.starts_with(render.as_str()))
-                && (name == RENDER_FILE
-                    || name.ends_with(".exr") && (name.starts_with("rgb") || name.starts_with("group_")))
-        };
-        // Numbers carry the dataset's fingerprint, so they must come from the files that it covers.
-        // Companions' pictures are checked when they are used, against their own list.
-        let concerns = |file: &str| !is_rendered(file) || is_light(file);
-        dataset.check_files(&scene.id, concerns)?;
+    /// Fails if a file differs from the dataset's manifest or does not fit the others: numbers carry the dataset's
+    /// fingerprint, so they must come from the files that it covers. Renders are not checked; `check_photos` does that for
+    /// those of the photo's renderer, and references are checked when they are opened.
+    pub fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Self, EvalError> {
+        // The input picture is a copy of a photo renderer's, which may have been renewed since.
+        let is_needed = |file: &str| !is_rendered(file) && !file.starts_with("views/input/rgb.");
+        dataset.check_files(&scene.id, is_needed)?;
         let folder = dataset.folder(&scene.id);
         let world = World::new(Arc::new(reference_io::read(&folder)?))?;
         let atlases = read_atlases(&folder, scene, &world)?;
         Ok(Self { folder, world, atlases })
     }
+}
+
+/// Fails if a picture with which fitted light is compared differs from the dataset's manifest.
+pub(crate) fn check_photos(dataset: &Dataset, scene: &SceneFile, renderer: &RendererId) -> Result<(), EvalError> {
+    let folder = format!("ground_truth/renders/{renderer}/");
+    Ok(dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?)
 }
 
 /// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's

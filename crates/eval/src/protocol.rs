@@ -1,14 +1,15 @@
 //! Protocols: the rules that every number depends on, as data with a fingerprint.
 
+use mateval_scene::SceneId;
 use mateval_scene::material::PrincipledFlavour;
-use mateval_scene::{RendererId, SceneId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::fixed_rules::FixedRules;
-use crate::light_rules::{LightRules, Track};
+use crate::light::rules::{LightRules, SampleRules, Track};
 pub use crate::mask_rule::MaskRule;
+use crate::result_key::{HEADLINE, PAPER_HEADLINE, ResultKey};
 
 /// Colour space in which MSE and PSNR of albedo are taken. SSIM and LPIPS always see sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -32,8 +33,10 @@ pub struct Protocol {
     pub albedo_space: AlbedoSpace,
     /// Whether views from other places than the input view's are scored, where a scene has any.
     pub wide_views: bool,
-    /// The number of decimals to which LPIPS is rounded: its last bits depend on the processor.
-    pub lpips_decimals: u32,
+    /// The number of decimals to which LPIPS and FLIP are rounded: the last bits of LPIPS depend on the processor.
+    pub rounded_decimals: u32,
+    /// The numbers that a table would print, the first of which orders boards.
+    pub headline: Vec<ResultKey>,
     /// The light under which predictions are compared.
     pub light: LightRules,
     /// Constants that all protocols share because the code holds them.
@@ -43,24 +46,33 @@ pub struct Protocol {
 }
 
 /// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version changed.
-pub const SCORER_VERSION: u32 = 9;
+pub const SCORER_VERSION: u32 = 10;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.
-    pub const NAMES: [&str; 2] = ["mateval-2", "paper"];
+    pub const NAMES: [&str; 2] = ["mateval-3", "paper"];
 
     /// A protocol by name.
     pub fn named(name: &str) -> Result<Self, EvalError> {
         let (mask_rule, albedo_space, light) = match name {
-            "mateval-2" => {
+            "mateval-3" => {
                 let tracks = vec![Track::True, Track::Relit];
                 (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
             }
             "paper" => {
-                let light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
+                let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
+                // Its numbers lie near 22 dB: a few plain samples are enough.
+                light.samples = SampleRules { at_320x240: 16, least: 16, most: 16, ..light.samples };
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
-            "mateval-1" => return Err(EvalError::RemovedProtocol { name: name.to_owned() }),
+            "mateval-1" => {
+                let reason = "under it the true material did not always score best";
+                return Err(EvalError::RemovedProtocol { name: name.to_owned(), reason });
+            }
+            "mateval-2" => {
+                let reason = "it compared renders with another renderer's noise, and stated errors that were up to five times off";
+                return Err(EvalError::RemovedProtocol { name: name.to_owned(), reason });
+            }
             _ => {
                 return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES });
             }
@@ -71,7 +83,8 @@ impl Protocol {
             albedo_space,
             // The paper has none.
             wide_views: name != "paper",
-            lpips_decimals: 6,
+            rounded_decimals: 6,
+            headline: if name == "paper" { PAPER_HEADLINE.to_vec() } else { HEADLINE.to_vec() },
             light,
             fixed: FixedRules::of_this_scorer(),
             scorer_version: SCORER_VERSION,
@@ -98,22 +111,16 @@ impl Protocol {
         mateval_scene::manifest::sha256_of_bytes(mateval_scene::json::to_text(self).as_bytes())
     }
 
-    /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, the renderer whose pictures light is
-    /// compared with, and the weights of LPIPS; the last two may be missing.
+    /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, and the weights of LPIPS, which may be
+    /// missing.
     pub fn fingerprint(
         &self,
         dataset_manifest_sha256: &str,
         scenes: &[&SceneId],
-        scored_renderer: Option<&RendererId>,
         lpips_weights_sha256: Option<&str>,
     ) -> String {
-        let text = mateval_scene::json::to_text(&(
-            self,
-            dataset_manifest_sha256,
-            scenes,
-            scored_renderer.map_or("missing", RendererId::as_str),
-            lpips_weights_sha256.unwrap_or("missing"),
-        ));
+        let weights = lpips_weights_sha256.unwrap_or("missing");
+        let text = mateval_scene::json::to_text(&(self, dataset_manifest_sha256, scenes, weights));
         mateval_scene::manifest::sha256_of_bytes(text.as_bytes())
     }
 }
@@ -124,26 +131,23 @@ mod tests {
 
     #[test]
     fn the_fingerprint_holds_everything() {
-        let base = Protocol::named("mateval-2").unwrap();
+        let base = Protocol::named("mateval-3").unwrap();
         let scene = SceneId::new("s").unwrap();
-        let renderer = RendererId::new("r").unwrap();
-        let print = |protocol: &Protocol| protocol.fingerprint("a", &[&scene], Some(&renderer), Some("w"));
+        let print = |protocol: &Protocol| protocol.fingerprint("a", &[&scene], Some("w"));
         let mut prints = vec![
             print(&base),
-            base.fingerprint("b", &[&scene], Some(&renderer), Some("w")),
-            base.fingerprint("a", &[], Some(&renderer), Some("w")),
-            base.fingerprint("a", &[&scene], None, Some("w")),
-            base.fingerprint("a", &[&scene], Some(&RendererId::new("q").unwrap()), Some("w")),
-            base.fingerprint("a", &[&scene], Some(&renderer), Some("v")),
-            base.fingerprint("a", &[&scene], Some(&renderer), None),
+            base.fingerprint("b", &[&scene], Some("w")),
+            base.fingerprint("a", &[], Some("w")),
+            base.fingerprint("a", &[&scene], Some("v")),
+            base.fingerprint("a", &[&scene], None),
             print(&Protocol::named("paper").unwrap()),
             print(&Protocol { albedo_space: AlbedoSpace::Srgb, ..base.clone() }),
             print(&Protocol { mask_rule: MaskRule::BlackFill, ..base.clone() }),
-            print(&Protocol { lpips_decimals: 5, ..base.clone() }),
+            print(&Protocol { rounded_decimals: 5, ..base.clone() }),
         ];
         prints.sort();
         prints.dedup();
-        assert_eq!(prints.len(), 11);
+        assert_eq!(prints.len(), 9);
     }
 
     /// `PROTOCOL.md` publishes the hashes: a constant that changes must change them there, and raise [`SCORER_VERSION`] if
@@ -158,8 +162,8 @@ mod tests {
     /// Every number and word of a protocol, changed by itself, changes its hash.
     #[test]
     fn every_constant_is_in_the_hash() {
-        let base = serde_json::to_value(Protocol::named("mateval-2").unwrap()).unwrap();
-        let mut hashes = vec![Protocol::named("mateval-2").unwrap().sha256()];
+        let base = serde_json::to_value(Protocol::named("mateval-3").unwrap()).unwrap();
+        let mut hashes = vec![Protocol::named("mateval-3").unwrap().sha256()];
         let mut pointers = Vec::new();
         leaves(&base, String::new(), &mut pointers);
         for pointer in &pointers {
@@ -175,6 +179,7 @@ mod tests {
                     "fitted" | "true" => "relit".into(),
                     "relit" => "true".into(),
                     "lpips_alex" => "lpips_vgg".into(),
+                    key if key.contains('.') => "albedo.wide.mse".into(),
                     other => format!("{other}x").into(),
                 },
                 serde_json::Value::Bool(holds) => (!holds).into(),
@@ -209,8 +214,10 @@ mod tests {
     }
 
     #[test]
-    fn the_first_protocol_is_refused_with_a_reason() {
-        let error = Protocol::named("mateval-1").unwrap_err().to_string();
-        assert!(error.contains("'mateval-1'") && error.contains("use 'mateval-2'"), "{error}");
+    fn removed_protocols_are_refused_with_a_reason() {
+        for (name, reason) in [("mateval-1", "did not always score best"), ("mateval-2", "another renderer's noise")] {
+            let error = Protocol::named(name).unwrap_err().to_string();
+            assert!(error.contains(reason) && error.contains("use 'mateval-3'"), "{error}");
+        }
     }
 }

@@ -1,31 +1,28 @@
 //! The types of `RESULT.json`: every number, its inputs, and what is missing.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::perturbation::Perturbation;
 use mateval_scene::submission::Cost;
-use mateval_scene::{Finding, InstanceId, SceneError, SceneId, ViewId, json};
+use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::fitted_radiances::FittedRadiances;
-use crate::measure::ValueNoise;
+use crate::light::lighting::{FittedRadiances, LightingName};
 use crate::metric::Metric;
 use crate::protocol::Protocol;
-use crate::relit::LightingName;
 use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
 use crate::word_enum::UnknownWord;
 
 /// The word for this version of a result.
-pub const RESULT_FORMAT: &str = "mateval-result/5";
+pub const RESULT_FORMAT: &str = "mateval-result/6";
 
 /// A submission's scores on a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultFile {
-    /// Always `mateval-result/5`.
+    /// Always `mateval-result/6`.
     pub format: String,
     /// Program and version, as in `mateval 0.1.0`.
     pub tool: String,
@@ -39,6 +36,11 @@ pub struct ResultFile {
     pub lpips_weights: BTreeMap<String, Option<String>>,
     /// The scores, by protocol.
     pub protocols: BTreeMap<String, ProtocolResult>,
+    /// Maps that the submission holds for no instance of any scored scene, by their words in its files. They have no values;
+    /// under light they are the default.
+    pub not_predicted: Vec<String>,
+    /// How far the scorer's tracer and Blender agree on this dataset, by `prep compare`; null where that was not run.
+    pub tracer_check: Option<TracerCheck>,
     /// Metrics that could not be computed, each with the command that makes it available.
     pub missing: Vec<MissingMetric>,
     /// Faults of the submission and what was scored instead, sorted.
@@ -46,11 +48,6 @@ pub struct ResultFile {
 }
 
 impl ResultFile {
-    /// Reads a result; fails where it has another format, is not valid, or holds a number that this version does not know.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
-        json::read_format(path, RESULT_FORMAT)
-    }
-
     /// The method's name in tables and on boards, with the geometry that it was given, as in `nn (pose 2)`.
     pub fn shown_method(&self) -> String {
         match &self.submission.geometry {
@@ -96,53 +93,27 @@ pub struct ProtocolResult {
     pub scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     /// Standard errors of the means of PSNR in `summary` due to render noise, in dB.
     pub summary_noise: BTreeMap<ResultKey, f64>,
-    /// The uncertainty of each scene's mean PSNR of light due to render noise, by the same keys.
-    pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>,
-    /// SHA-256, hex, of the `companions.json` whose pictures corrected the light of a scene, by scene and pass.
-    pub companions: BTreeMap<SceneId, BTreeMap<String, String>>,
+    /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where the error
+    /// of a picture may be noise alone.
+    pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     /// The radiances that were fitted, by scene.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
-    /// Every single value.
-    pub pictures: Vec<PictureValue>,
+    /// The values of every picture over every region.
+    pub pictures: Vec<PictureValues>,
     /// The errors of each instance's texels.
     pub texels: Vec<InstanceTexelErrors>,
     /// The errors of each instance's pixels.
     pub instances: Vec<InstancePixelErrors>,
 }
 
-/// The uncertainty of a scene's mean PSNR due to render noise.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Whether two renderers show the same rooms.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PsnrNoise {
-    /// Standard error due to all noise, in dB; null where the error may be noise alone, so that PSNR is a lower bound.
-    pub standard_error_db: Option<f64>,
-    /// The part due to the noise of our own paths, which more samples lower.
-    pub own_db: Option<f64>,
-    /// The part due to the noise of the companions' converged pictures.
-    pub companions_db: Option<f64>,
-    /// The part due to the noise of the truth.
-    pub truth_db: Option<f64>,
-    /// The part due to the noise of fitted radiances; 0 where none were fitted.
-    pub fit_db: Option<f64>,
-    /// Samples per pixel of each of our halves.
-    pub samples: u32,
-    /// Whether the samples were enough.
-    pub state: NoiseState,
-}
-
-/// Whether the samples of a scene were enough.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseState {
-    /// The noise of our paths is under the protocol's bound, and that of truth, companions and fit together too.
-    Certified,
-    /// The noise of truth, companions and fit is above the bound, and that of our paths under the protocol's share of it.
-    LimitedByTruth,
-    /// The most samples were taken, and our noise is above the bound.
-    SampleCap,
-    /// The number of samples that the pilot estimated was too small, or the pixels are unobserved or specular ones, which the
-    /// pilot does not weigh separately.
-    AboveTarget,
+pub struct TracerCheck {
+    /// Checks that were precise enough to say something.
+    pub informative: usize,
+    /// Those of them in which both agree.
+    pub agree: usize,
 }
 
 /// The mean squared errors of one instance's texels, weighted by area.
@@ -159,8 +130,7 @@ pub struct InstanceTexelErrors {
     pub unobserved: TexelErrors,
 }
 
-/// Means over texels by their area on the surface; null where there is no area, and of roughness and metallic where the
-/// scene's source does not state them.
+/// Means over texels by their area on the surface; null where there is no area.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TexelErrors {
@@ -168,10 +138,6 @@ pub struct TexelErrors {
     pub area_m2: f64,
     /// Linear, mean over channels.
     pub base_color_mse: Option<f64>,
-    /// Of roughness.
-    pub roughness_mse: Option<f64>,
-    /// Of metallic.
-    pub metallic_mse: Option<f64>,
 }
 
 /// The squared error of one instance's pixels in one kind of picture.
@@ -196,10 +162,10 @@ pub struct InstancePixelErrors {
     pub mse: f64,
 }
 
-/// One value of one picture.
+/// The values of one picture over one region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PictureValue {
+pub struct PictureValues {
     /// Its scene.
     pub scene: SceneId,
     /// Its view.
@@ -211,19 +177,20 @@ pub struct PictureValue {
     pub lighting: Option<LightingName>,
     /// The pixels that count.
     pub region: Region,
-    /// The metric, by the last word of its keys.
-    #[schemars(with = "String", regex(pattern = "^[a-z0-9_]+$"))]
-    pub metric: Metric,
-    /// Null where no pixel or window counts.
-    pub value: Option<f64>,
-    /// For PSNR: the MSE was exactly zero, the value is the cap.
+    /// Their number. SSIM of a mask is a mean over the windows that lie wholly inside.
+    pub pixels: usize,
+    /// The value of each metric; those are left out for which no pixel or window counts.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub values: BTreeMap<Metric, f64>,
+    /// Of light: the standard error of the MSE due to render noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mse_error: Option<f64>,
+    /// The MSE was exactly zero, and its PSNR is the cap.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub exact: bool,
-    /// For MSE and PSNR of light: the uncertainty.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise: Option<ValueNoise>,
-    /// Pixels (for SSIM inside a mask: windows) that the value is a mean over.
-    pub count: usize,
+    /// Of light: the error may be noise alone; the PSNR is that of 1.645 standard errors of the MSE.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lower_bound: bool,
 }
 
 /// Numbers that could not be computed.
@@ -281,9 +248,9 @@ impl JsonSchema for MissingNumbers {
     }
 }
 
-impl PictureValue {
-    /// The mean that it counts for.
-    pub fn key(&self) -> ResultKey {
-        ResultKey { picture: self.picture, views: Views::of(&self.view, self.region), metric: self.metric }
+impl PictureValues {
+    /// The mean that one of its values counts for.
+    pub fn key(&self, metric: Metric) -> ResultKey {
+        ResultKey { picture: self.picture, views: Views::of(&self.view, self.region), metric }
     }
 }

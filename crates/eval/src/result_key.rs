@@ -6,6 +6,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use mateval_scene::ViewId;
+use mateval_scene::submission::Map;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
@@ -25,22 +26,14 @@ word_enum! {
     RgbFitted = "rgb_fitted",
     /// Renders under the scene's own lights with other weights.
     RgbRelit = "rgb_relit",
-    /// Pictures of roughness.
     Roughness = "roughness",
-    /// Pictures of metallic.
     Metallic = "metallic",
     /// The texels of base colour.
     TextureBaseColor = "texture_base_color",
-    /// The texels of roughness.
-    TextureRoughness = "texture_roughness",
-    /// The texels of metallic.
-    TextureMetallic = "texture_metallic",
 }
 
 word_enum! {
-    /// Which surfaces count.
     Surfaces, a "kind of surfaces":
-    /// All of them.
     All = "all",
     /// Those that are metal or smooth in truth.
     Specular = "specular",
@@ -84,8 +77,16 @@ impl PictureKind {
             Self::Roughness => "Roughness",
             Self::Metallic => "Metallic",
             Self::TextureBaseColor => "Base colour texels",
-            Self::TextureRoughness => "Roughness texels",
-            Self::TextureMetallic => "Metallic texels",
+        }
+    }
+
+    /// The map that it shows; none for light, which comes from all of them.
+    pub const fn map(self) -> Option<Map> {
+        match self {
+            Self::Albedo | Self::AlbedoAligned | Self::TextureBaseColor => Some(Map::BaseColor),
+            Self::Roughness => Some(Map::Roughness),
+            Self::Metallic => Some(Map::Metallic),
+            Self::RgbTrue | Self::RgbFitted | Self::RgbRelit => None,
         }
     }
 
@@ -142,9 +143,7 @@ impl Views {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct PictureName {
-    /// What is compared.
     pub kind: PictureKind,
-    /// Where.
     pub surfaces: Surfaces,
 }
 
@@ -154,11 +153,33 @@ pub struct PictureName {
 pub struct ResultKey {
     /// What is compared and on which surfaces.
     pub picture: PictureName,
-    /// In which views.
     pub views: Views,
-    /// By which metric.
     pub metric: Metric,
 }
+
+const fn psnr(kind: PictureKind, views: Views) -> ResultKey {
+    ResultKey::whole(kind, views, Metric::Psnr)
+}
+
+/// The headline numbers of `mateval-3`.
+pub const HEADLINE: [ResultKey; 8] = [
+    psnr(PictureKind::Albedo, Views::Novel),
+    psnr(PictureKind::RgbTrue, Views::Novel),
+    psnr(PictureKind::Albedo, Views::Input),
+    psnr(PictureKind::Albedo, Views::Unobserved),
+    psnr(PictureKind::AlbedoAligned, Views::Novel),
+    psnr(PictureKind::RgbTrue, Views::Input),
+    psnr(PictureKind::RgbRelit, Views::Novel),
+    ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::LpipsAlex),
+];
+
+/// The headline numbers of `paper`.
+pub const PAPER_HEADLINE: [ResultKey; 4] = [
+    psnr(PictureKind::RgbFitted, Views::Input),
+    psnr(PictureKind::RgbFitted, Views::Novel),
+    psnr(PictureKind::Albedo, Views::Input),
+    psnr(PictureKind::Albedo, Views::Novel),
+];
 
 /// A text that is not a key of a result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -168,12 +189,7 @@ pub enum BadResultKey {
     Shape(String),
     /// One of its words is unknown.
     #[error("{} is not a key of a result: {source}", quoted(key))]
-    Word {
-        /// The text.
-        key: String,
-        /// The word.
-        source: UnknownWord,
-    },
+    Word { key: String, source: UnknownWord },
 }
 
 impl PictureName {
@@ -231,26 +247,12 @@ impl FromStr for ResultKey {
     }
 }
 
-/// What both kinds of names do by way of their text. They compare as their texts do, which is the order of a result's keys.
+/// What both kinds of names do by way of their text.
 macro_rules! by_text {
     ($name:ident, $error:ty, $pattern:literal) => {
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 self.parts().iter().try_for_each(|part| f.write_str(part))
-            }
-        }
-
-        impl Ord for $name {
-            fn cmp(&self, other: &Self) -> Ordering {
-                let [a, b] = [self, other].map(|name| name.parts());
-                let bytes = |parts: &'static str| parts.bytes();
-                a.into_iter().flat_map(bytes).cmp(b.into_iter().flat_map(bytes))
-            }
-        }
-
-        impl PartialOrd for $name {
-            fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-                Some(self.cmp(other))
             }
         }
 
@@ -283,6 +285,37 @@ macro_rules! by_text {
 by_text!(PictureName, UnknownWord, "^[a-z_]+$");
 by_text!(ResultKey, BadResultKey, "^[a-z_]+\\.[a-z_]+\\.[a-z0-9_]+$");
 
+fn by_letters(a: &[&'static str], b: &[&'static str]) -> Ordering {
+    let letters = |parts: &[&'static str]| parts.iter().flat_map(|part| part.bytes()).collect::<Vec<_>>();
+    letters(a).cmp(&letters(b))
+}
+
+impl Ord for PictureName {
+    fn cmp(&self, other: &Self) -> Ordering {
+        by_letters(&self.parts(), &other.parts())
+    }
+}
+
+impl PartialOrd for PictureName {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The headline numbers first, all others in the order of their texts: the order of a result's keys.
+impl Ord for ResultKey {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let place = |key: &Self| HEADLINE.iter().position(|headline| headline == key).unwrap_or(HEADLINE.len());
+        place(self).cmp(&place(other)).then_with(|| by_letters(&self.parts(), &other.parts()))
+    }
+}
+
+impl PartialOrd for ResultKey {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -303,7 +336,7 @@ mod tests {
     #[test]
     fn keys_are_parsed_from_what_they_print() {
         let keys = all();
-        assert_eq!(keys.len(), 10 * 2 * 6 * Metric::ALL.len());
+        assert_eq!(keys.len(), 8 * 2 * 6 * Metric::ALL.len());
         for key in &keys {
             assert_eq!(key.to_string().parse(), Ok(*key));
             let json = serde_json::to_string(key).unwrap();
@@ -318,20 +351,22 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_in_the_order_of_their_texts() {
+    fn headlines_come_first_and_then_the_order_of_texts() {
         let mut keys = all();
         keys.sort();
-        let mut texts: Vec<String> = all().iter().map(ResultKey::to_string).collect();
-        texts.sort();
-        assert_eq!(keys.iter().map(ResultKey::to_string).collect::<Vec<_>>(), texts);
-        texts.dedup();
-        assert_eq!(texts.len(), keys.len());
+        let (first, rest) = keys.split_at(HEADLINE.len());
+        assert_eq!(first, HEADLINE);
+        let texts: Vec<String> = rest.iter().map(ResultKey::to_string).collect();
+        let mut sorted = texts.clone();
+        sorted.sort();
+        sorted.dedup();
+        assert_eq!(texts, sorted);
     }
 
     #[test]
     fn unknown_words_are_named() {
         for (text, unknown) in [
-            ("albedo.novel.rmse", "'rmse' is not a metric; expected one of: mse, psnr, "),
+            ("albedo.novel.rmse", "'rmse' is not a metric; expected one of: mse, mae, psnr, "),
             ("albedo.behind.psnr", "'behind' is not a kind of views"),
             ("shading.novel.psnr", "'shading' is not a kind of picture"),
             ("albedo_specular_specular.novel.psnr", "'albedo_specular' is not a kind of picture"),
@@ -350,7 +385,7 @@ mod tests {
     fn the_published_example_holds_known_keys_alone() {
         let text = include_str!("../../../dataset_spec/examples/result.json");
         let read = |text: &str| serde_json::from_str::<crate::result::ResultFile>(text).map_err(|e| e.to_string());
-        assert!(read(text).unwrap().protocols["mateval-2"].summary.len() >= 4);
+        assert!(read(text).unwrap().protocols["mateval-3"].summary.len() >= 4);
         for twin in ["albedo.input.mze", "albido.input.mse", "albedo.inputs.mse"] {
             let error = read(&text.replace("albedo.input.mse", twin)).unwrap_err();
             assert!(error.contains(&format!("'{twin}' is not a key of a result")), "{error}");

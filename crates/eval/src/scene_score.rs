@@ -1,62 +1,28 @@
-//! Scores of one submission in one scene under one protocol, nested by view and picture until the result is written.
+//! Scores of one submission in one scene under one protocol, and what they are made of while the scene is being scored.
 
 use std::collections::BTreeMap;
 
-use mateval_scene::ViewId;
+use mateval_image::{Mask, Picture};
+use mateval_scene::dataset::SceneFile;
 use serde::{Deserialize, Serialize};
 
-use crate::fitted_radiances::FittedRadiances;
-use crate::instance_errors::InstanceErrors;
-use crate::measure::Measured;
-use crate::relit::LightingName;
-use crate::result::{InstancePixelErrors, InstanceTexelErrors, PsnrNoise};
-use crate::result_key::{PictureKind, PictureName, Region, Views};
-use crate::scene_task::MaskedRegion;
-use crate::truth_noise::NoisyLighting;
+use crate::light::error::LightMse;
+use crate::light::lighting::FittedRadiances;
+use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValues};
+use crate::result_key::{PictureKind, ResultKey, Views};
 
 /// What one submission scored in one scene under one protocol.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SceneScore {
-    /// In the order of measuring; a view comes again under each light.
-    pub(crate) views: Vec<ViewScore>,
+    pub(crate) pictures: Vec<PictureValues>,
     pub(crate) texels: Vec<InstanceTexelErrors>,
     pub(crate) instances: Vec<InstancePixelErrors>,
-    pub(crate) noise: Vec<NoiseScore>,
-    /// SHA-256, hex, of the `companions.json` of each pass.
-    pub(crate) companions: BTreeMap<String, String>,
-    pub(crate) noisy_lightings: Vec<NoisyLighting>,
+    /// Standard errors of the scene's mean PSNRs of light, in dB.
+    pub(crate) noise: BTreeMap<ResultKey, f64>,
     pub(crate) fit: Option<FittedRadiances>,
     /// Number of contributions of light that were not finite and count as none.
     pub(crate) not_finite: u64,
-}
-
-/// Pictures of one view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct ViewScore {
-    pub(crate) view: ViewId,
-    pub(crate) pictures: Vec<PictureScore>,
-}
-
-/// The metrics of one picture over one of its regions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct PictureScore {
-    pub(crate) picture: PictureName,
-    /// For pictures of kind `rgb_relit`.
-    pub(crate) lighting: Option<LightingName>,
-    pub(crate) region: Region,
-    pub(crate) metrics: Vec<Measured>,
-}
-
-/// The noise in the mean PSNR of a picture over some views.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct NoiseScore {
-    pub(crate) picture: PictureName,
-    pub(crate) views: Views,
-    pub(crate) noise: PsnrNoise,
 }
 
 /// Scores of one submission and protocol while a scene is being scored.
@@ -64,40 +30,52 @@ pub(crate) struct NoiseScore {
 pub(crate) struct ScoreSheet {
     pub(crate) score: SceneScore,
     pub(crate) errors: InstanceErrors,
+    /// The errors of light by the mean that they count for.
+    pub(crate) light_errors: BTreeMap<ResultKey, Vec<LightMse>>,
 }
 
-impl ScoreSheet {
-    /// Adds the numbers of wide views from a sheet that holds the input view's too.
-    pub(crate) fn add_wide(&mut self, sheet: Self) {
-        let is_wide = |views: Views| matches!(views, Views::Wide | Views::WideUnobserved);
-        let SceneScore { views, noise, companions, not_finite, .. } = sheet.score;
-        self.score.views.extend(views.into_iter().filter(|score| score.view.is_wide()));
-        self.score.noise.extend(noise.into_iter().filter(|score| is_wide(score.views)));
-        self.score.companions.extend(companions);
-        self.score.not_finite += not_finite;
-        self.errors.extend_where(sheet.errors, is_wide);
-    }
-}
+/// Sums of squared errors of a scene's pixels by picture, views and instance.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct InstanceErrors(BTreeMap<(PictureKind, Views, u16), (f64, usize)>);
 
-impl SceneScore {
-    /// Adds pictures of a view.
-    pub(crate) fn add(&mut self, view: &ViewId, pictures: Vec<PictureScore>) {
-        match self.views.last_mut().filter(|last| last.view == *view) {
-            Some(last) => last.pictures.extend(pictures),
-            None => self.views.push(ViewScore { view: view.clone(), pictures }),
+impl InstanceErrors {
+    /// Adds `error(k)`, a mean over channels, of every pixel k in the mask to the instance that it shows.
+    pub(crate) fn add(
+        &mut self,
+        picture: PictureKind,
+        views: Views,
+        instances: &Picture<u16>,
+        mask: &Mask,
+        error: impl Fn(usize) -> f64,
+    ) {
+        let mut sums: BTreeMap<u16, (f64, usize)> = BTreeMap::new();
+        for (pixel, instance) in instances.pixels().iter().enumerate().filter(|(pixel, _)| mask.pixels()[*pixel]) {
+            let (sum, count) = sums.entry(*instance).or_default();
+            *sum += error(pixel);
+            *count += 1;
+        }
+        for (instance, (sum, count)) in sums {
+            let all = self.0.entry((picture, views, instance)).or_default();
+            all.0 += sum;
+            all.1 += count;
         }
     }
-}
 
-impl MaskedRegion {
-    /// What was measured of a kind of picture over this region.
-    pub(crate) fn score(
-        &self,
-        kind: PictureKind,
-        lighting: Option<LightingName>,
-        metrics: Vec<Measured>,
-    ) -> PictureScore {
-        let picture = PictureName { kind, surfaces: self.surfaces };
-        PictureScore { picture, lighting, region: self.region, metrics }
+    /// The means, by picture, views and index. Pixels that show no instance are left out.
+    pub(crate) fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
+        let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {
+            let instance = scene.instances.iter().find(|instance| instance.index.0.get() == index)?;
+            Some(InstancePixelErrors {
+                scene: scene.id.clone(),
+                instance: instance.id.clone(),
+                category: instance.listed_category().map(str::to_owned),
+                super_category: instance.listed_super_category().map(str::to_owned),
+                picture,
+                views,
+                pixels,
+                mse: sum / pixels as f64,
+            })
+        });
+        means.collect()
     }
 }

@@ -7,37 +7,36 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_metrics::Lpips;
 use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::companions_file::light_inputs_sha256;
+use mateval_scene::compare_file::{CompareCounts, CompareFile};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::open::Dataset;
-use mateval_scene::submission::{SUBMISSION, SubmissionFile};
+use mateval_scene::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
-
-use crate::companion_store::MadeIn;
-use crate::error::EvalError;
-use crate::light_rules::Track;
-use crate::metric::{LPIPS_NET, Metric};
-use crate::open_scene::{OpenScene, scored_views};
-use crate::protocol::Protocol;
-use crate::result::{MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId};
-use crate::result_writer::protocol_result;
-use crate::scene_score::SceneScore;
-use crate::scene_scorer::score_scene;
-use crate::scene_task::SceneTask;
-use crate::truth_noise::NoisyLighting;
-use crate::view_set::ViewSet;
 use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::hashed_file::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_submission::submission_json::SubmissionJson;
 
+use crate::error::EvalError;
+use crate::light::reference::StoredReference;
+use crate::light::rules::Track;
+use crate::light::score::score_light;
+use crate::metric::{LPIPS_NET, Metric};
+use crate::open_scene::ViewSet;
+use crate::open_scene::{OpenScene, check_photos, scored_views};
+use crate::pictures_dir::PicturesDir;
+use crate::protocol::Protocol;
+use crate::result::{
+    MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
+};
+use crate::scene_score::{SceneScore, ScoreSheet};
+use crate::scene_task::SceneTask;
+
 /// The network of LPIPS, or the reason why it is missing.
 pub enum LpipsWeights {
-    /// Loaded.
     Loaded(Box<Lpips>),
-    /// Missing.
     Missing {
         /// The reason, for the result's list of missing metrics.
         reason: String,
@@ -57,11 +56,8 @@ impl LpipsWeights {
 
 /// What to score.
 pub struct ScorePlan<'a> {
-    /// The dataset.
     pub dataset: &'a Dataset,
-    /// Submission folders.
     pub submissions: Vec<&'a Path>,
-    /// The rules.
     pub protocols: Vec<Protocol>,
     /// The scenes to score; all if empty.
     pub scenes: Vec<SceneId>,
@@ -76,9 +72,9 @@ pub struct ScorePlan<'a> {
     pub cache: Option<&'a Path>,
     /// Take every score from the cache and compute none.
     pub only_cached: bool,
-    /// A folder in which the converged pictures of companions are kept between runs. Without one, and without those of the
-    /// dataset, each run makes its own.
-    pub companion_cache: Option<&'a Path>,
+    /// A folder for the pictures behind the numbers, which nothing reads back; with several submissions a folder of it for
+    /// each. No scores are then taken from the cache.
+    pub pictures: Option<&'a Path>,
 }
 
 /// One submission while it is being scored.
@@ -94,7 +90,6 @@ struct Entry {
 struct Outcome {
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
-    /// By protocol.
     scores: Vec<SceneScore>,
 }
 
@@ -116,16 +111,16 @@ struct Outcome {
 /// let plan = ScorePlan {
 ///     dataset: &dataset,
 ///     submissions: vec![Path::new("submission")],
-///     protocols: vec![Protocol::named("mateval-2")?],
+///     protocols: vec![Protocol::named("mateval-3")?],
 ///     scenes: Vec::new(),
 ///     lpips: LpipsWeights::Loaded(Box::new(lpips)),
 ///     tool: "my tool 1.0".to_owned(),
 ///     jobs: 1,
 ///     cache: None,
 ///     only_cached: false,
-///     companion_cache: None,
+///     pictures: None,
 /// };
-/// for (key, value) in &score(&plan, &|_| ())?[0].protocols["mateval-2"].summary {
+/// for (key, value) in &score(&plan, &|_| ())?[0].protocols["mateval-3"].summary {
 ///     println!("{key} {value}");
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -149,7 +144,8 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
             }
         }
     }
-    Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
+    let check = tracer_check(plan.dataset)?;
+    Ok(entries.into_iter().map(|entry| finish(plan, &scenes, check.clone(), entry)).collect())
 }
 
 /// Fails where a scene was rendered apart since the manifest was written: its light would silently not be scored.
@@ -198,7 +194,7 @@ fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) ->
     let read = |path: &&Path| read_scene(path, scene, &atlases);
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(read).collect::<Result<_, _>>()?;
     let mut scores: Vec<Option<Vec<SceneScore>>> =
-        predictions.iter().map(|prediction| plan.read_cached(scene, prediction)).collect();
+        predictions.iter().map(|p| plan.read_cached(scene, p).filter(|_| plan.pictures.is_none())).collect();
     let uncached: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
     if !uncached.is_empty() {
         let chosen: Vec<PredictedScene> = uncached.iter().map(|&at| predictions[at].clone()).collect();
@@ -250,9 +246,26 @@ impl ScorePlan<'_> {
         predictions: &[PredictedScene],
         progress: Progress<'_>,
     ) -> Result<Vec<Vec<SceneScore>>, EvalError> {
-        let renderer = self.dataset.scored_renderer(scene);
-        let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene, renderer)?;
+        let has = |track| self.protocols.iter().any(|protocol| protocol.light.tracks.contains(&track));
+        let reference = if has(Track::True) { StoredReference::listed(self.dataset, scene)? } else { None };
+        // A dataset that has references has them all: a scene without one would silently have no light.
+        if has(Track::True) && reference.is_none() && scene.photo.is_none() && has_references(self.dataset) {
+            return Err(EvalError::Reference {
+                dataset: self.dataset.root.clone(),
+                scene: scene.id.clone(),
+                path: self.dataset.folder(&scene.id).scorer(),
+                what: "it is missing".to_owned(),
+            });
+        }
+        let renderer = self.dataset.photo_renderer(scene).filter(|_| has(Track::Fitted));
+        if let Some(renderer) = renderer {
+            check_photos(self.dataset, scene, renderer)?;
+        }
+        let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene)?;
+        let folders: Option<Vec<PathBuf>> = self.pictures.map(|root| self.picture_folders(root));
+        let pictures = folders.as_ref().map(|folders| PicturesDir { folders });
         score_scene(&SceneTask {
+            dataset: &self.dataset.root,
             scene,
             folder: &folder,
             world: &world,
@@ -262,11 +275,19 @@ impl ScorePlan<'_> {
             predictions,
             protocols: &self.protocols,
             lpips: self.lpips.network(),
+            reference: reference.as_ref(),
             renderer,
-            companions_made_in: self.companion_cache.map_or(MadeIn::ThisRun, MadeIn::Cache),
-            inputs_sha256: light_inputs_sha256(&self.dataset.root, &scene.id)?,
+            pictures: pictures.as_ref(),
             progress,
         })
+    }
+
+    /// The folder of each submission's pictures.
+    fn picture_folders(&self, root: &Path) -> Vec<PathBuf> {
+        match self.submissions.as_slice() {
+            [_] => vec![root.to_owned()],
+            several => (0..several.len()).map(|at| root.join(at.to_string())).collect(),
+        }
     }
 
     /// The cache's file for a scene's scores under a protocol, named after the hash of everything that they depend on. None
@@ -274,7 +295,7 @@ impl ScorePlan<'_> {
     fn cache_file(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
         let weights = self.lpips.network().map(Lpips::sha256);
         let file = &self.dataset.file;
-        let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], file.scored_renderer.as_ref(), weights);
+        let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], weights);
         // A file that cannot be read has no hash, but may replace a map by its default; a finding states it.
         let scored = (&self.tool, print, &prediction.files, &prediction.findings);
         let key = sha256_of_bytes(json::to_text(&scored).as_bytes());
@@ -321,7 +342,12 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
     Ok(Entry { file, findings, files: vec![hashed], scores: vec![Vec::new(); plan.protocols.len()] })
 }
 
-fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> ResultFile {
+fn finish(
+    plan: &ScorePlan<'_>,
+    scored: &[&SceneFile],
+    tracer_check: Option<TracerCheck>,
+    mut entry: Entry,
+) -> ResultFile {
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
     let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
@@ -330,12 +356,11 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
     if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
         entry.findings.extend(scored.iter().filter(|scene| scene.photo.is_some()).map(|scene| unknown_light(scene)));
     }
-    let noisy = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| noisy_truth(protocol, scores));
-    entry.findings.extend(noisy);
+    let not_predicted = not_predicted(&entry.files);
+    entry.findings.extend(not_predicted.iter().map(|map| not_predicted_finding(*map)));
     let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
-        let renderer = plan.dataset.file.scored_renderer.as_ref();
-        let fingerprint = protocol.fingerprint(manifest, &ids, renderer, weights);
-        (protocol.name.clone(), protocol_result(protocol, fingerprint, scores))
+        let fingerprint = protocol.fingerprint(manifest, &ids, weights);
+        (protocol.name.clone(), ProtocolResult::new(protocol, fingerprint, scores, &not_predicted))
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
     let missing = missing(plan, scored);
@@ -355,9 +380,28 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
         dataset: DatasetId::new(plan.dataset, scored.iter().copied()),
         lpips_weights: BTreeMap::from([(LPIPS_NET.name().to_owned(), weights.map(str::to_owned))]),
         protocols,
+        not_predicted: not_predicted.iter().map(|map| map.stem().to_owned()).collect(),
+        tracer_check,
         missing,
         findings: entry.findings,
     }
+}
+
+/// Whether the dataset was rendered by the scorer, so that scenes of unknown light aside each has a reference.
+fn has_references(dataset: &Dataset) -> bool {
+    dataset.file.photo_renderer.is_some()
+        || dataset.scenes.iter().any(|scene| dataset.folder(&scene.id).scorer().exists())
+}
+
+/// The verdict of `prep compare` on this very dataset; none where it was not run.
+fn tracer_check(dataset: &Dataset) -> Result<Option<TracerCheck>, EvalError> {
+    let file = CompareFile::read_beside(&dataset.root)?;
+    let file = file.filter(|file| file.manifest_sha256 == dataset.file.manifest_sha256);
+    Ok(file.map(|file| {
+        let sum = |of: fn(&CompareCounts) -> usize| file.scenes.values().map(of).sum::<usize>();
+        let agree = sum(|counts| counts.agree);
+        TracerCheck { informative: agree + sum(|counts| counts.differ), agree }
+    }))
 }
 
 /// The finding about a scene with a photo from elsewhere.
@@ -386,24 +430,24 @@ fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Find
     .collect()
 }
 
-/// A finding for each lighting that is not scored because its truth is too noisy.
-fn noisy_truth(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Finding> {
-    let noisy = scores.iter().flat_map(|(scene, score)| score.noisy_lightings.iter().map(move |noisy| (scene, noisy)));
-    let most = protocol.light.relit.most_truth_variance;
-    noisy
-        .map(|(scene, NoisyLighting { lighting, variance })| Finding {
-            severity: Severity::Note,
-            code: "noisy_lighting".to_owned(),
-            file: format!("scenes/{scene}"),
-            place: lighting.to_string(),
-            message: format!(
-                "protocol '{}': the truth's input view has a variance of {variance:.1e} in this lighting, expected at \
-                 most {most:.1e}",
-                protocol.name
-            ),
-            action: "this lighting is not scored; render the truth with more samples".to_owned(),
-        })
-        .collect()
+/// The maps of which a submission's files hold none.
+fn not_predicted(files: &[HashedFile]) -> Vec<Map> {
+    let is_of = |file: &HashedFile, map: Map| {
+        let name = file.path.rsplit('/').next().unwrap_or_default();
+        name.split_once('.').is_some_and(|(stem, _)| stem == map.stem())
+    };
+    Map::ALL.into_iter().filter(|map| !files.iter().any(|file| is_of(file, *map))).collect()
+}
+
+fn not_predicted_finding(map: Map) -> Finding {
+    Finding {
+        severity: Severity::Note,
+        code: "not_predicted".to_owned(),
+        file: SUBMISSION.to_owned(),
+        place: String::new(),
+        message: format!("the submission holds no {} of any scored instance", map.stem()),
+        action: "it has no value; under light it is rendered as the default".to_owned(),
+    }
 }
 
 /// The metrics that lack weights or renders.
@@ -416,11 +460,14 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
             fix: fix.clone(),
         });
     }
-    let is_rendered = scored.iter().any(|scene| plan.dataset.scored_renderer(scene).is_some());
-    if !is_rendered && scored.iter().any(|scene| scene.photo.is_none()) {
+    if scored.iter().any(|scene| scene.photo.is_none()) {
         let mut tracks: Vec<Track> = plan.protocols.iter().flat_map(|p| p.light.tracks.clone()).collect();
         tracks.sort_unstable();
         tracks.dedup();
+        tracks.retain(|track| match track {
+            Track::Fitted => plan.dataset.file.photo_renderer.is_none(),
+            Track::True | Track::Relit => !has_references(plan.dataset),
+        });
         missing.extend(tracks.into_iter().map(|track| MissingMetric {
             metric: MissingNumbers::Picture(track.picture()),
             reason: "the dataset has no renders to compare with".to_owned(),
@@ -428,4 +475,27 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
         }));
     }
     missing
+}
+
+/// Scores every submission under every protocol. Returns the scores by submission, then by protocol.
+fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> {
+    let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
+    let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
+    for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {
+        let wanted = |at: usize| task.set == ViewSet::Turned || task.protocols[at].wide_views;
+        if !(0..task.protocols.len()).any(wanted) {
+            continue;
+        }
+        let truths = task.truths()?;
+        let base_colors = task.score_materials(&truths, &wanted, &mut sheets)?;
+        for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
+            score_light(&task, &truths, &base_colors, at, &mut sheets)?;
+        }
+    }
+    task.score_texels(&mut sheets)?;
+    let finish = |mut sheet: ScoreSheet| {
+        sheet.state_noise();
+        SceneScore { instances: sheet.errors.finish(task.scene), ..sheet.score }
+    };
+    Ok(sheets.into_iter().map(|sheets| sheets.into_iter().map(finish).collect()).collect())
 }

@@ -1,24 +1,24 @@
 //! Pictures of a scene for display: the truth and every submission.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_image::{LinearRgb, Picture};
-use mateval_scene::companions_file::light_inputs_sha256;
+use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::open::Dataset;
-use mateval_scene::{Progress, RendererId, TriangleMesh};
+use mateval_scene::{Progress, TriangleMesh};
+use mateval_submission::atlas_meshes::AtlasMeshes;
+use mateval_submission::prediction::{PredictedScene, read_scene};
 
-use crate::companion_store::MadeIn;
 use crate::error::EvalError;
-use crate::light_score::{ShownLight, shown_light};
+use crate::light::reference::StoredReference;
+use crate::light::score::compare_light;
 use crate::material_pictures::material_pictures;
+use crate::open_scene::ViewSet;
 use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
 use crate::truth::ViewTruth;
-use crate::view_set::ViewSet;
-use mateval_submission::atlas_meshes::AtlasMeshes;
-use mateval_submission::prediction::{PredictedScene, read_scene};
 
 /// The truth and every submission's albedo of one view, linear.
 pub struct SceneAlbedo {
@@ -34,10 +34,10 @@ pub fn scene_albedo(
     scene: &SceneFile,
     submissions: &[&Path],
 ) -> Result<Vec<SceneAlbedo>, EvalError> {
-    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, None)?;
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
     let predictions = predictions_of(submissions, scene, &atlases)?;
     let view = |view: &View| {
-        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
+        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions.iter().collect::<Vec<_>>());
         let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
         Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
     };
@@ -53,48 +53,67 @@ fn predictions_of(
     Ok(submissions.iter().map(|path| read_scene(path, scene, &atlases)).collect::<Result<_, _>>()?)
 }
 
-/// The truth's light and every submission's of one view, for display.
+/// The truth's light and every submission's of one view, clipped and encoded for display.
 pub struct SceneLight {
     /// The truth's pictures and masks.
     pub truth: ViewTruth,
-    /// Truth and submissions, the latter in the given order.
-    pub shown: ShownLight,
+    /// What submissions are compared with.
+    pub reference: Picture<SrgbRgb>,
+    /// One for each submission, in the given order.
+    pub predicted: Vec<Picture<SrgbRgb>>,
 }
 
-/// The views of a scene that are scored, in the scene's order, in the first of the protocol's tracks.
+/// The views of a scene that are scored and share the input view's place, in the scene's order, in the first of the
+/// protocol's tracks. Fails where the dataset has no reference for it.
 pub fn scene_light(
     dataset: &Dataset,
     scene: &SceneFile,
     submissions: &[&Path],
     protocol: &Protocol,
-    renderer: &RendererId,
     progress: Progress<'_>,
 ) -> Result<Vec<SceneLight>, EvalError> {
-    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, Some(renderer))?;
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
     let predictions = predictions_of(submissions, scene, &atlases)?;
-    let views = scored_views(dataset, scene)?;
-    let truths = views.iter().map(|view| ViewTruth::read(&folder, view)).collect::<Result<Vec<_>, _>>()?;
+    let reference = StoredReference::listed(dataset, scene)?;
     let task = SceneTask {
+        dataset: &dataset.root,
         scene,
         folder: &folder,
         world: &world,
         atlases: &atlases,
-        views,
+        views: ViewSet::Turned.of(&scored_views(dataset, scene)?),
         set: ViewSet::Turned,
         predictions: &predictions,
         protocols: std::slice::from_ref(protocol),
         lpips: None,
-        renderer: Some(renderer),
-        companions_made_in: MadeIn::ThisRun,
-        inputs_sha256: light_inputs_sha256(&dataset.root, &scene.id)?,
+        reference: reference.as_ref(),
+        renderer: dataset.photo_renderer(scene),
+        pictures: None,
         progress,
     };
-    let mut base_colors = vec![Vec::new(); predictions.len()];
-    for view in &task.views {
-        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
-        base_colors.iter_mut().zip(pictures).for_each(|(views, pictures)| views.push(pictures.base_color));
+    let truths = task.truths()?;
+    let base_colors = task.base_colors()?;
+    let first = protocol.light.tracks.first().copied();
+    // By view, and by submission and view: submissions arrive in any order.
+    let mut references = Vec::new();
+    let mut predicted: BTreeMap<usize, Vec<Picture<SrgbRgb>>> = BTreeMap::new();
+    compare_light(&task, &truths, &base_colors, protocol, &mut |submission, light| {
+        if Some(light.track) == first {
+            if references.is_empty() {
+                references = light.references.iter().map(|reference| reference.picture.clone()).collect();
+            }
+            predicted.insert(submission, light.views.into_iter().map(|view| view.shown).collect());
+        }
+        Ok(())
+    })?;
+    if references.is_empty() && !submissions.is_empty() {
+        return Err(EvalError::NoPhotoRenderer { dataset: dataset.root.clone() });
     }
-    let shown = shown_light(&task, renderer, &truths, &base_colors)?;
-    let rows = truths.into_iter().zip(shown);
-    Ok(rows.map(|(truth, shown)| SceneLight { truth, shown }).collect())
+    let rows = truths.into_iter().zip(references).enumerate();
+    let row = |(at, (truth, reference)): (usize, (ViewTruth, Picture<SrgbRgb>))| SceneLight {
+        truth,
+        reference,
+        predicted: predicted.values().map(|views| views[at].clone()).collect(),
+    };
+    Ok(rows.map(row).collect())
 }

@@ -8,18 +8,21 @@
 //! A [`TexelMap`], shared by all submissions, holds where each texel of the truth's atlas lies, how large it is and whether
 //! the input camera sees it. One instance is in memory at a time.
 
+use std::path::Path;
+
 use mateval_image::Texture;
-use mateval_metrics::{MetricError, Psnr};
+use mateval_image::exr_io::{self, Precision};
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::reference::SurfaceIndex;
-use mateval_scene::submission::{MAP_SIZES, Map};
+use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::{InstanceId, Progress, Report, TriangleMesh};
 use mateval_tracer::World;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::truth_material::TruthMaterial;
+use crate::light::true_maps::TruthMaterial;
+use crate::pictures_dir::PicturesDir;
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
 
@@ -30,10 +33,6 @@ pub struct TexelSums {
     pub area_m2: f64,
     /// Squared error of the base colour, linear, mean over its channels, times the weight.
     pub base_color: f64,
-    /// Squared error of the perceptual roughness times the weight.
-    pub roughness: f64,
-    /// Squared error of metallic times the weight.
-    pub metallic: f64,
 }
 
 impl TexelSums {
@@ -41,34 +40,20 @@ impl TexelSums {
     pub fn add(&mut self, other: &Self) {
         self.area_m2 += other.area_m2;
         self.base_color += other.base_color;
-        self.roughness += other.roughness;
-        self.metallic += other.metallic;
     }
 
     /// The mean squared error over the area; none where the area is zero.
-    pub fn mse(&self, map: Map) -> Option<f64> {
-        let sum = match map {
-            Map::BaseColor => self.base_color,
-            Map::Roughness => self.roughness,
-            Map::Metallic => self.metallic,
-        };
-        (self.area_m2 > 0.0).then(|| sum / self.area_m2)
-    }
-
-    /// The PSNR of [`Self::mse`]. Fails if that is not finite, as with an immense area.
-    pub fn psnr(&self, map: Map) -> Result<Option<Psnr>, MetricError> {
-        self.mse(map).map(Psnr::from_mse).transpose()
+    pub fn mse(&self) -> Option<f64> {
+        (self.area_m2 > 0.0).then(|| self.base_color / self.area_m2)
     }
 }
 
 /// The errors of a submission on one instance, over all texels on its surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceTexels {
-    /// The instance.
     pub instance: InstanceId,
     /// Texels that the input camera sees.
     pub observed: TexelSums,
-    /// All others.
     pub unobserved: TexelSums,
 }
 
@@ -82,6 +67,7 @@ pub fn texture_space(
     world: &World,
     atlases: &[TriangleMesh],
     submissions: &[PredictedScene],
+    pictures: Option<&PicturesDir<'_>>,
     progress: Progress<'_>,
 ) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
     let input = scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene.id.clone() })?;
@@ -94,8 +80,12 @@ pub fn texture_space(
             || TruthMaterial::read(folder, &instance.id, size),
         );
         let truth = truth?;
-        for (list, submission) in compared.iter_mut().zip(submissions) {
+        for (number, (list, submission)) in compared.iter_mut().zip(submissions).enumerate() {
             let Some(prediction) = &submission.materials[at] else { continue };
+            if let Some(pictures) = pictures {
+                let path = pictures.texels(number, &scene.id, &instance.id)?;
+                write_texels(&path, &map, &prediction.base_color, &truth.base_color)?;
+            }
             let [observed, unobserved] = compare(&map, prediction, &truth);
             list.push(InstanceTexels { instance: instance.id.clone(), observed, unobserved });
         }
@@ -137,16 +127,27 @@ fn compare_row(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMate
         };
         let weight = texel.area_m2;
         let [r, g, b] = of_channels(&prediction.base_color, &truth.base_color);
-        let [roughness, ..] = of_channels(&prediction.roughness, &truth.roughness);
-        let [metallic, ..] = of_channels(&prediction.metallic, &truth.metallic);
-        sums[usize::from(!texel.observed)].add(&TexelSums {
-            area_m2: weight,
-            base_color: weight * (r + g + b) / 3.0,
-            roughness: weight * roughness,
-            metallic: weight * metallic,
-        });
+        sums[usize::from(!texel.observed)].add(&TexelSums { area_m2: weight, base_color: weight * (r + g + b) / 3.0 });
     }
     sums
+}
+
+/// Writes what the errors of an instance are computed from: for each texel of the atlas its area on the surface (0 off it), 1
+/// where the input view sees it, and the base colours of prediction and truth at its place.
+fn write_texels(path: &Path, map: &TexelMap, prediction: &Texture, truth: &Texture) -> Result<(), EvalError> {
+    let size = map.size();
+    let mut planes = vec![vec![0.0; size * size]; 8];
+    for y in 0..size {
+        for texel in map.row(y) {
+            let at = y * size + texel.column;
+            let [p, t] = [prediction, truth].map(|texture| value(size, texture, &texel, y));
+            let seen = if texel.observed { 1.0 } else { 0.0 };
+            let values = [texel.area_m2 as f32, seen, p[0], p[1], p[2], t[0], t[1], t[2]];
+            planes.iter_mut().zip(values).for_each(|(plane, value)| plane[at] = value);
+        }
+    }
+    let names = ["area", "observed", "prediction.R", "prediction.G", "prediction.B", "truth.R", "truth.G", "truth.B"];
+    Ok(exr_io::write_channels(path, size, size, names.into_iter().zip(planes).collect(), Precision::Float)?)
 }
 
 /// A texture's value at the place of a texel of row `y`.
@@ -236,14 +237,9 @@ mod tests {
             let (map, truth) = (map([1.0, 3.0], size), truth(size));
             let [observed, unobserved] = compare(&map, &predicted(&truth), &truth);
             assert!(observed.area_m2 > 3.0 && unobserved == TexelSums::default());
-            for property in Map::ALL {
-                let psnr = observed.psnr(property).unwrap().unwrap();
-                assert_eq!((observed.mse(property), psnr.exact, psnr.db), (Some(0.0), true, 100.0));
-            }
-            assert_eq!(unobserved.mse(Map::Roughness), None);
-            let moved = PredictedMaterial { metallic: greys(size, |x, _| x as f32), ..predicted(&truth) };
-            let [observed, _] = compare(&map, &moved, &truth);
-            assert!(observed.metallic > 0.0 && observed.roughness == 0.0);
+            assert_eq!((observed.mse(), unobserved.mse()), (Some(0.0), None));
+            let moved = PredictedMaterial { base_color: greys(size, |x, _| x as f32), ..predicted(&truth) };
+            assert!(compare(&map, &moved, &truth)[0].base_color > 0.0);
         }
     }
 
@@ -254,11 +250,10 @@ mod tests {
         let truth = TruthMaterial { base_color: grey.clone(), roughness: grey, metallic: white };
         for size in [64, 256, 320] {
             let half_wrong = greys(size, |x, _| if x < size * 15 / 32 { 0.5 } else { 0.75 });
-            let prediction = PredictedMaterial { roughness: half_wrong, ..predicted(&truth) };
+            let prediction = PredictedMaterial { base_color: half_wrong, ..predicted(&truth) };
             let [observed, _] = compare(&map([2.0, 2.0], 64), &prediction, &truth);
-            let found = observed.mse(Map::Roughness).unwrap();
+            let found = observed.mse().unwrap();
             assert!((found - 1.0 / 32.0).abs() < 1e-8, "{size}: {found}");
-            assert_eq!((observed.base_color, observed.metallic), (0.0, 0.0));
         }
     }
 
@@ -273,7 +268,7 @@ mod tests {
         let map = map([1.0, 3.0], 64);
         let [observed, _] = compare(&map, &prediction, &truth);
         let square = f64::from(0.2_f32).powi(2);
-        assert!((observed.mse(Map::BaseColor).unwrap() / square - 0.75).abs() < 1e-6);
+        assert!((observed.mse().unwrap() / square - 0.75).abs() < 1e-6);
         let texels: Vec<SurfaceTexel> = (0..64).flat_map(|y| map.row(y)).collect();
         let wrong_texels = texels.iter().filter(|texel| texel.column >= 30).count();
         assert_eq!(2 * wrong_texels, texels.len());
@@ -287,7 +282,7 @@ mod tests {
         let truth = TruthMaterial { base_color: color([1.0, 0.5, 0.0]), roughness: zero.clone(), metallic: zero };
         let prediction = PredictedMaterial { base_color: color([1.3, 0.5, 0.0]), ..predicted(&truth) };
         let [observed, _] = compare(&map([1.0, 1.0], 64), &prediction, &truth);
-        assert!((observed.mse(Map::BaseColor).unwrap() - 0.03).abs() < 1e-7);
+        assert!((observed.mse().unwrap() - 0.03).abs() < 1e-7);
     }
 
     #[test]
@@ -298,7 +293,7 @@ mod tests {
             pool.install(|| compare(&map([1.0, 3.0], 100), &predicted(&wrong), &truth(100)))
         };
         let one = sums(1);
-        assert!(one[0].base_color > 0.0 && one[0].metallic > 0.0);
+        assert!(one[0].base_color > 0.0);
         assert_eq!(one, sums(2));
         assert_eq!(one, sums(3));
     }
@@ -315,9 +310,9 @@ mod tests {
         let zero = greys(1, |_, _| 0.0);
         let truth = TruthMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
         let wrong = greys(64, |_, y| if y >= 32 { 0.0 } else { 0.5 });
-        let [observed, _] = compare(&map, &PredictedMaterial { metallic: wrong, ..predicted(&truth) }, &truth);
+        let [observed, _] = compare(&map, &PredictedMaterial { base_color: wrong, ..predicted(&truth) }, &truth);
         assert!((observed.area_m2 - 4.0).abs() < 1e-5, "{}", observed.area_m2);
-        assert!((observed.mse(Map::Metallic).unwrap() - 0.75 * 0.25).abs() < 1e-6);
+        assert!((observed.mse().unwrap() - 0.75 * 0.25).abs() < 1e-6);
     }
 
     /// A dataset's scene of one instance of 64 texels a side, and a submission of its truth.
@@ -335,7 +330,7 @@ mod tests {
         }
         let atlas = json!({"size": 64, "charts": 1, "coverage": 0.5, "texel_m": 0.1, "half_pixel_m": null});
         let file = json!({
-            "format": "mateval/2", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
+            "format": "mateval/3", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
                        "states_metallic": true, "files": []},
             "lights": "own", "materials": "converted", "exposure": 1.0,
             "views": [{"id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera()}],
@@ -356,7 +351,7 @@ mod tests {
         let atlases = AtlasMeshes::in_memory(&meshes);
         let submissions = [submission, std::path::Path::new("nowhere")];
         let submissions = submissions.map(|path| read_scene(path, scene, &atlases).unwrap());
-        texture_space(folder, scene, &world(&meshes[0]), &meshes, &submissions, &|_| ())
+        texture_space(folder, scene, &world(&meshes[0]), &meshes, &submissions, None, &|_| ())
     }
 
     #[test]
@@ -364,11 +359,9 @@ mod tests {
         let (root, folder, scene) = on_disk();
         let both = compared(&folder, &scene, &root.path().join("submission")).unwrap();
         let [[same], [nothing]] = [both[0].as_slice(), both[1].as_slice()] else { panic!("{both:?}") };
-        assert_eq!(Map::ALL.map(|map| same.observed.mse(map)), [Some(0.0); 3]);
+        assert_eq!(same.observed.mse(), Some(0.0));
         assert_eq!((same.observed.area_m2, same.unobserved), (nothing.observed.area_m2, TexelSums::default()));
-        // What is missing is metallic 0.
-        let metallic = (30_000.0_f64 / 65_535.0).powi(2);
-        assert!((nothing.observed.mse(Map::Metallic).unwrap() - metallic).abs() < 1e-7);
+        assert!(nothing.observed.mse().unwrap() > 0.01);
     }
 
     #[test]

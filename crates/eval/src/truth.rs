@@ -1,14 +1,11 @@
-//! The ground truth of views: maps, masks and light.
+//! The ground truth of views: maps and masks, and the picture of the photo's renderer.
 
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_scene::RendererId;
 use mateval_scene::dataset::View;
 use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_tracer::LightBasis;
 
 use crate::error::EvalError;
-use crate::relit::RelitLighting;
-use crate::stored_light::StoredLight;
 
 /// A view's true maps and its masks.
 pub struct ViewTruth {
@@ -64,90 +61,15 @@ impl ViewTruth {
     }
 }
 
-/// A view's light, linear, before exposure: two independent halves, and the picture for SSIM, LPIPS and the fit.
-#[derive(Clone, Debug)]
-pub struct RgbTruth {
-    /// The halves.
-    pub halves: [Picture<LinearRgb>; 2],
-    /// Their mean, with its noise taken out.
-    pub shown: Picture<LinearRgb>,
-}
-
-impl RgbTruth {
-    /// The view under the scene's own lights.
-    pub fn read(folder: &SceneFolder, renderer: &RendererId, view: &View) -> Result<Self, EvalError> {
-        let part = |name: &str| Self::read_part(folder, renderer, view, name);
-        Ok(Self { halves: [part("rgb_a")?, part("rgb_b")?], shown: part("rgb")? })
-    }
-
-    /// The denoised picture of the view under one light group alone.
-    pub fn shown_of_group(
-        folder: &SceneFolder,
-        renderer: &RendererId,
-        view: &View,
-        group: usize,
-    ) -> Result<Picture<LinearRgb>, EvalError> {
-        Self::read_part(folder, renderer, view, &group_name(group))
-    }
-
-    fn read_part(
-        folder: &SceneFolder,
-        renderer: &RendererId,
-        view: &View,
-        name: &str,
-    ) -> Result<Picture<LinearRgb>, EvalError> {
-        let picture = exr_io::read_linear(&folder.render(renderer, &view.id).join(format!("{name}.exr")))?;
-        check_sizes(view, &[size(&picture)])?;
-        Ok(picture)
-    }
-}
-
-/// A view's light under one lighting, exposed: two independent halves, and the picture for SSIM and LPIPS.
-pub struct TrueLight {
-    /// The halves.
-    pub(crate) halves: [StoredLight; 2],
-    /// Their mean, with its noise taken out.
-    pub(crate) shown: StoredLight,
-}
-
-impl TrueLight {
-    /// The light of a view under the scene's own lights.
-    pub fn new(truth: &RgbTruth, exposure: f64) -> Self {
-        let stored = |picture| StoredLight::exposed(picture, exposure);
-        Self { halves: [stored(&truth.halves[0]), stored(&truth.halves[1])], shown: stored(&truth.shown) }
-    }
-
-    /// The halves, exposed.
-    pub fn halves(&self) -> [Picture<LinearRgb>; 2] {
-        [0, 1].map(|half| self.halves[half].picture())
-    }
-
-    /// The view under each of `lightings`: weighted sums of the groups' pictures, each of which is read once.
-    pub fn relit(
-        folder: &SceneFolder,
-        renderer: &RendererId,
-        view: &View,
-        lightings: &[RelitLighting],
-        exposure: f64,
-    ) -> Result<Vec<Self>, EvalError> {
-        let Some(first) = lightings.first() else { return Ok(Vec::new()) };
-        let k = view.camera.intrinsics;
-        let mixed = |ending: &str| -> Result<Vec<StoredLight>, EvalError> {
-            let group = |group| RgbTruth::read_part(folder, renderer, view, &format!("{}{ending}", group_name(group)));
-            let pictures = (0..first.weights.len()).map(group).collect::<Result<_, _>>()?;
-            let basis = LightBasis::new(k.width as usize, k.height as usize, pictures)?;
-            let mix =
-                |lighting: &RelitLighting| Ok(StoredLight::exposed(&basis.weighted(&lighting.weights)?, exposure));
-            lightings.iter().map(mix).collect()
-        };
-        let (a, b, shown) = (mixed("_a")?, mixed("_b")?, mixed("")?);
-        let lights = a.into_iter().zip(b).zip(shown);
-        Ok(lights.map(|((a, b), shown)| Self { halves: [a, b], shown }).collect())
-    }
-}
-
-fn group_name(group: usize) -> String {
-    format!("group_{group:02}")
+/// The picture of a view that the photo's renderer made, linear, before exposure.
+pub fn photo_of_renderer(
+    folder: &SceneFolder,
+    renderer: &RendererId,
+    view: &View,
+) -> Result<Picture<LinearRgb>, EvalError> {
+    let picture = exr_io::read_linear(&folder.render(renderer, &view.id).join("rgb.exr"))?;
+    check_sizes(view, &[size(&picture)])?;
+    Ok(picture)
 }
 
 /// The pixels where both masks are set. The masks have the same size.
@@ -159,7 +81,8 @@ fn size<T: Copy>(picture: &Picture<T>) -> (usize, usize) {
     (picture.width(), picture.height())
 }
 
-fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), EvalError> {
+/// Fails where a picture is not of the camera's size.
+pub(crate) fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), EvalError> {
     let expected = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
     match sizes.iter().find(|found| **found != expected) {
         None => Ok(()),

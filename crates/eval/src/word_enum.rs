@@ -6,7 +6,6 @@
 pub struct UnknownWord {
     /// The kind of word that was expected, as in "metric".
     pub what: &'static str,
-    /// The word.
     pub word: String,
     /// The words that are known, separated by commas.
     pub expected: String,

@@ -8,15 +8,12 @@
 
 mod suite {
     mod cache;
-    mod companions;
     mod damages;
     mod mask_rules;
-    mod noise;
-    mod noisy_room;
     mod planted_light;
     mod protocol_rules;
-    mod relit;
     mod same_bytes;
     mod sample;
+    mod truth;
     mod verify;
 }

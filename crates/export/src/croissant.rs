@@ -163,7 +163,7 @@ fn file_object(name: &str, place: &str, sha256: &str, facts: Value) -> Value {
 /// The views' pictures. The input view's is that of `views/`; its copy among the renders is not matched.
 fn pictures(sound: &SoundDataset, tars: &[WrittenTar]) -> Value {
     let mut includes = vec![format!("scenes/*/views/{INPUT}/rgb.png")];
-    if let Some(renderer) = &sound.dataset.file.scored_renderer {
+    if let Some(renderer) = &sound.dataset.file.photo_renderer {
         let rendered = sound.dataset.scenes.iter().filter(|scene| scene.photo.is_none());
         let views = rendered.flat_map(|scene| scene.views.iter().map(|view| &view.id));
         let novel: std::collections::BTreeSet<&ViewId> = views.filter(|id| id.as_str() != INPUT).collect();

@@ -23,7 +23,7 @@ pub struct ShownView<'a> {
 /// view. None where it does not exist, as with withheld ground truth.
 pub fn picture(dataset: &Dataset, scene: &SceneFile, view: &View) -> Option<PathBuf> {
     let folder = dataset.folder(&scene.id);
-    let file = match (view.id.as_str(), dataset.scored_renderer(scene)) {
+    let file = match (view.id.as_str(), dataset.photo_renderer(scene)) {
         (INPUT, _) => folder.view(&view.id),
         (_, Some(renderer)) => folder.render(renderer, &view.id),
         (_, None) => return None,

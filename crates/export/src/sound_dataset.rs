@@ -31,7 +31,7 @@ impl SoundDataset {
         } else if let Some(absence) = dataset.absence() {
             progress(Report::Message(&absence));
         }
-        let is_rendered = |scene: &SceneFile| scene.photo.is_some() || dataset.scored_renderer(scene).is_some();
+        let is_rendered = |scene: &SceneFile| scene.photo.is_some() || dataset.photo_renderer(scene).is_some();
         if format.needs_pictures() && !dataset.scenes.iter().all(is_rendered) {
             return Err(ExportError::NoPictures { path: root.to_owned() });
         }

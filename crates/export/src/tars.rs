@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use mateval_scene::layout::{DATASET, MANIFEST};
+use mateval_scene::layout::{COMPARE, DATASET, MANIFEST};
 use mateval_scene::manifest::hex;
 use mateval_scene::open::is_below;
 use mateval_scene::{Progress, Report};
@@ -47,6 +47,7 @@ pub fn write(sound: &SoundDataset, out: &Path, progress: Progress<'_>) -> Result
     let ids = &sound.dataset.file.scenes;
     let mut base: Vec<&str> = sound.files.iter().map(String::as_str).filter(|file| !is_below(file, ids)).collect();
     base.extend([DATASET, MANIFEST]);
+    base.extend(sound.dataset.root.join(COMPARE).is_file().then_some(COMPARE));
     base.sort_unstable();
     let mut tars = vec![write_tar(&sound.dataset.root, &base, out, BASE)?];
     for (at, id) in ids.iter().enumerate() {

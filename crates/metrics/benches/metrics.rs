@@ -1,12 +1,12 @@
-//! Wall time of SSIM and LPIPS on 512x512 pictures: `cargo bench -p mateval-metrics -- FOLDER`, where the folder holds
-//! the LPIPS weights; without one, SSIM alone. Best of five; VGG best of two.
+//! Wall time of SSIM, FLIP and LPIPS on 512x512 pictures: `cargo bench -p mateval-metrics -- FOLDER`, where the folder
+//! holds the LPIPS weights; without one, SSIM and FLIP alone. Best of five; VGG best of two.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 
 use std::path::PathBuf;
 use std::time::Instant;
 
 use mateval_image::{Picture, SrgbRgb};
-use mateval_metrics::{Lpips, Net, ssim};
+use mateval_metrics::{Lpips, Net, flip, ssim};
 
 fn best_of(runs: usize, what: &str, mut run: impl FnMut() -> f64) {
     let time = |_| {
@@ -25,6 +25,8 @@ fn main() {
     };
     let (p, r) = (pattern(3, 7), pattern(5, 2));
     best_of(5, "ssim", || ssim(&p, &r).unwrap());
+    let all = Picture::filled(512, 512, true);
+    best_of(5, "flip", || flip(&p, &r, &all).unwrap().unwrap());
     let Some(folder) = std::env::args().skip(1).find(|word| !word.starts_with("--")).map(PathBuf::from) else { return };
     for (net, runs) in [(Net::Alex, 5), (Net::Vgg, 2)] {
         let start = Instant::now();

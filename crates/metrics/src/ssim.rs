@@ -62,7 +62,7 @@ pub fn ssim_black_fill<P: Pixel>(
     Ok((pixel_count(mask) > 0).then_some(value))
 }
 
-/// The mean over the windows that lie wholly inside picture and mask (protocol `mateval-2`), `None` without such a
+/// The mean over the windows that lie wholly inside picture and mask (protocol `mateval-3`), `None` without such a
 /// window. Values outside the mask are not read. Fails as [`ssim`] does.
 pub fn ssim_valid_windows<P: Pixel>(
     prediction: &Picture<P>,

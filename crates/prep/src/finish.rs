@@ -6,6 +6,7 @@ use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
+use mateval_scene::layout::is_rendered;
 use mateval_scene::layout::{DATASET, SceneFolder, TARGETS};
 use mateval_scene::open::check_whole;
 use mateval_scene::render_file::RENDER_FILE;
@@ -80,7 +81,7 @@ fn finish_with(
         version: recipe.version.clone(),
         tool: tool.to_owned(),
         scenes,
-        scored_renderer: None,
+        photo_renderer: None,
         licences: Vec::new(),
         geometry: None,
         manifest_sha256: String::new(),
@@ -162,16 +163,16 @@ pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepEr
     if names.is_empty() { Ok(()) } else { Err(PrepError::StrayScenes { path: folder, names }) }
 }
 
-/// Checks the scenes' files, shows the scored renderer's photo in each, and returns the hashes of all files. Sets the
-/// scored renderer.
+/// Checks the scenes' files, shows the photo renderer's picture in each, and returns the hashes of all files. Sets the
+/// photo renderer.
 fn scene_hashes(
     root: &Path,
     dataset: &mut DatasetFile,
     cut_off: CutOffRenders,
     progress: Progress<'_>,
 ) -> Result<BTreeMap<String, String>, PrepError> {
-    dataset.scored_renderer = scored_renderer(root, dataset);
-    let shown = dataset.scored_renderer.clone().or_else(|| any_renderer(root, &dataset.scenes));
+    dataset.photo_renderer = photo_renderer(root, dataset);
+    let shown = dataset.photo_renderer.clone().or_else(|| any_renderer(root, &dataset.scenes));
     let changed = BuildFolder::of(root).changed();
     let (mut findings, mut lists) = (Vec::new(), Vec::new());
     for (at, id) in dataset.scenes.iter().enumerate() {
@@ -207,14 +208,9 @@ fn is_input_picture(path: &str) -> bool {
     path.ends_with("/views/input/rgb.exr") || path.ends_with("/views/input/rgb.png")
 }
 
-/// Whether a path in the dataset is that of a file that `prep render` or `prep companions` writes.
-fn is_rendered(path: &str) -> bool {
-    path.contains("/ground_truth/renders/") || path.contains("/ground_truth/companions/")
-}
-
 /// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no
 /// photo from elsewhere; none where none has, or where all scenes have one.
-fn scored_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
+fn photo_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
     let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
     let rendered: Vec<SceneId> = dataset.scenes.iter().filter(|id| !is_photographed(root, id)).cloned().collect();
     known.find(|renderer| !rendered.is_empty() && rendered.iter().all(|id| is_complete(root, id, renderer)))

@@ -12,6 +12,7 @@
 pub mod atlas;
 pub mod bake;
 pub mod blender;
+pub mod bring_up_to_date;
 pub mod build;
 pub mod build_scene;
 pub mod conversion;

@@ -1,12 +1,12 @@
 //! Makes the pictures of one view from one camera matrix: geometry for methods, and material truth for the scorer.
 
-use glam::{DVec2, Vec2};
-use mateval_image::{LinearRgb, Mask, Normal, Picture, Texture};
+use glam::DVec2;
+use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use mateval_scene::Camera;
 use mateval_scene::material::Appearance;
 use mateval_scene::reference::{Emission, ReferenceScene, SurfaceIndex};
 use mateval_tracer::World;
-use mateval_tracer::aov::{PixelHit, PixelMean, hit_through, is_veiled, subpixel};
+use mateval_tracer::aov::{PixelHit, PixelMean, appearance, flatness_values, hit_through, is_veiled, subpixel};
 use rayon::prelude::*;
 
 /// Surfaces of a lower roughness count as specular.
@@ -16,9 +16,7 @@ const SPECULAR_METALLIC: f32 = 0.999;
 
 /// A scene prepared for its pictures.
 pub struct ViewScene<'a> {
-    reference: &'a ReferenceScene,
     world: &'a World,
-    textures: Vec<Texture>,
     /// The value in `instance.png` of every surface.
     instances: &'a [u16],
     /// Whether each surface is scored.
@@ -118,8 +116,7 @@ pub struct PixelTruth {
 impl<'a> ViewScene<'a> {
     /// Prepares a scene. `instances` and `scored` hold an entry for each surface.
     pub fn new(reference: &'a ReferenceScene, world: &'a World, instances: &'a [u16], scored: &'a [bool]) -> Self {
-        let textures = reference.texture_list();
-        Self { reference, world, textures, instances, scored, glow: glow_of_surfaces(reference) }
+        Self { world, instances, scored, glow: glow_of_surfaces(reference) }
     }
 
     /// The pictures that `camera` sees. Pixels whose surface point `input` does not show are unobserved; the input view itself
@@ -176,13 +173,11 @@ impl<'a> ViewScene<'a> {
     /// partly transparent.
     fn truth(&self, camera: &Camera, x: usize, y: usize) -> (PixelTruth, bool) {
         let mut veiled = false;
-        let PixelMean { mean, whole } = PixelMean::of(|at| {
+        let PixelMean { mean, whole, .. } = PixelMean::of(|at| {
             let place = subpixel(x, y, at);
             veiled |= is_veiled(self.world, camera, place);
             let seen = hit_through(self.world, camera, place).and_then(|hit| self.scored_appearance(&hit))?;
-            let [r, g, b] = seen.base_color;
-            let rest = 1.0 - seen.metallic;
-            Some([r, g, b, r * rest, g * rest, b * rest, seen.roughness, seen.metallic])
+            Some(flatness_values(&seen))
         });
         let [r, g, b, dr, dg, db, roughness, metallic] = mean;
         let truth = PixelTruth { albedo: [r, g, b], diffuse_albedo: [dr, dg, db], roughness, metallic };
@@ -196,7 +191,7 @@ impl<'a> ViewScene<'a> {
         if glows || !self.scored[hit.surface.0] {
             return None;
         }
-        appearance(self.reference, &self.textures, hit)
+        appearance(self.world, hit.surface, hit.triangle, hit.barycentrics)
     }
 
     /// Whether the input view shows the surface point at `pixel` of `camera`: it is within the frame and not hidden.
@@ -213,20 +208,12 @@ impl<'a> ViewScene<'a> {
     }
 }
 
-/// base_color, roughness and metallic of the hit surface.
-fn appearance(reference: &ReferenceScene, textures: &[Texture], hit: &PixelHit) -> Option<Appearance> {
-    let surface = &reference.surfaces[hit.surface.0];
-    let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
-    reference.materials[surface.material.0].appearance(textures, uv)
-}
-
 /// Linear base_color at pixel centres, also of surfaces that emit light; 0 where the surface has none.
 pub fn base_color_at_centres(world: &World, camera: &Camera) -> Picture<LinearRgb> {
-    let textures = world.scene().texture_list();
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
     let base_color = |x: usize, y: usize| {
         let hit = hit_through(world, camera, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-        let seen = hit.and_then(|hit| appearance(world.scene(), &textures, &hit));
+        let seen = hit.and_then(|hit| appearance(world, hit.surface, hit.triangle, hit.barycentrics));
         LinearRgb(seen.map_or([0.0; 3], |seen| seen.base_color))
     };
     let base_color = &base_color;

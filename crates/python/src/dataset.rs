@@ -49,10 +49,10 @@ impl Dataset {
         &self.0.file.manifest_sha256
     }
 
-    /// The renderer of the reference pictures; None until all views are rendered.
+    /// The renderer of the photo and of the pictures of other views; None until all views are rendered.
     #[getter]
-    fn scored_renderer(&self) -> Option<&str> {
-        self.0.file.scored_renderer.as_ref().map(|renderer| renderer.as_str())
+    fn photo_renderer(&self) -> Option<&str> {
+        self.0.file.photo_renderer.as_ref().map(|renderer| renderer.as_str())
     }
 
     /// Ids of the scenes that the dataset lists and whose folders are missing: they were not downloaded.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use mateval_cli::{TOOL, cache_folder, find_weights};
+use mateval_cli::{TOOL, find_weights};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::score::ScorePlan;
 use mateval_metrics::Net;
@@ -75,7 +75,6 @@ impl ScoreTask {
         if let Some(cache) = &self.cache {
             std::fs::create_dir_all(cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
         }
-        let companions = cache_folder().join("companions");
         let plan = ScorePlan {
             dataset: &self.dataset,
             submissions: vec![opened.root()],
@@ -87,9 +86,9 @@ impl ScoreTask {
             jobs: 1,
             cache: self.cache.as_deref(),
             only_cached: false,
-            companion_cache: Some(&companions),
+            pictures: None,
         };
         let results = mateval_eval::score::score(&plan, progress).context("cannot score")?;
-        Ok(results.iter().map(json::to_text).collect())
+        Ok(results.iter().map(json::to_lines).collect())
     }
 }

@@ -78,7 +78,7 @@ impl Truth {
         plane(py, &read_picture(py, self.path("specular_region.png"), &self.view().camera, png_io::read_mask)?)
     }
 
-    /// The scored renderer's picture, linear radiance in Rec. 709 before exposure: (height, width, 3), float32. Raises
+    /// The picture of the photo's renderer, linear radiance in Rec. 709 before exposure: (height, width, 3), float32. Raises
     /// MatEvalError where the scene is not rendered.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
@@ -87,8 +87,8 @@ impl Truth {
         if scene.photo.is_some() {
             return Err(failed(EvalError::Photographed { scene: scene.id.clone() }));
         }
-        let Some(renderer) = dataset.scored_renderer(scene) else {
-            return Err(failed(EvalError::NoScoredRenderer { dataset: dataset.root.clone() }));
+        let Some(renderer) = dataset.photo_renderer(scene) else {
+            return Err(failed(EvalError::NoPhotoRenderer { dataset: dataset.root.clone() }));
         };
         self.colours(py, self.source.folder().render(renderer, &self.view().id).join("rgb.exr"))
     }

@@ -20,7 +20,7 @@ def test_a_dataset_is_a_mapping_of_scenes(root, dataset):
     file = json.loads((root / "dataset.json").read_text())
     assert dataset.name == file["name"] and dataset.version == file["version"]
     assert dataset.manifest_sha256 == file["manifest_sha256"]
-    assert dataset.scored_renderer == "builtin"
+    assert dataset.photo_renderer == "builtin"
     copy = pickle.loads(pickle.dumps(dataset))
     assert copy.manifest_sha256 == dataset.manifest_sha256
     assert dataset == dataset and copy != dataset and len({dataset, copy}) == 2

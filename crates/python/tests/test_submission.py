@@ -130,12 +130,15 @@ def test_score_is_the_commands(root, dataset, nn, command, tmp_path):
     with pytest.raises(mateval.UnknownId, match="no mean 'albedo.input.pnsr'; expected a key such as 'albedo.input.psnr'"):
         result["albedo.input.pnsr"]
     records = result.to_records()
-    assert len(records) > 50 and {"scene", "view", "picture", "metric", "value"} <= set(records[0])
+    assert len(records) > 50 and {"scene", "view", "picture", "region", "pixels", "metric", "value"} <= set(records[0])
+    assert "values" not in records[0] and not result.not_predicted
+    (record,) = [r for r in records if (r["picture"], r["view"], r["metric"]) == ("albedo", "input", "psnr")]
+    assert record["value"] == result["albedo.input.psnr"]
     assert mateval.score(nn, dataset, scenes=["room"], cache=tmp_path / "cache").json == result.json
 
 
 def test_score_refuses_what_it_does_not_know(dataset, nn, tmp_path):
-    with pytest.raises(mateval.Error, match="there is no protocol 'best'; use one of: .*mateval-2"):
+    with pytest.raises(mateval.Error, match="there is no protocol 'best'; use one of: .*mateval-3"):
         mateval.score(nn, dataset, protocol="best")
     with pytest.raises(mateval.UnknownId, match="has no scene 'hall'; it has 'room'"):
         mateval.score(nn, dataset, scenes=["hall"])

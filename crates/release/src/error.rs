@@ -39,6 +39,9 @@ pub enum ReleaseError {
     /// The dataset could not be examined.
     #[error(transparent)]
     Audit(#[from] mateval_audit::AuditError),
+    /// A result could not be checked.
+    #[error(transparent)]
+    Eval(#[from] mateval_eval::EvalError),
     /// The recipe could not be read.
     #[error(transparent)]
     Prep(#[from] mateval_prep::PrepError),

@@ -74,7 +74,7 @@ pub struct ReleasedDataset {
     pub manifest_sha256: String,
     /// The renderer of the RGB truth; null where not all scenes without a photo from elsewhere are rendered, and
     /// where there are none.
-    pub scored_renderer: Option<RendererId>,
+    pub photo_renderer: Option<RendererId>,
 }
 
 /// The ground truth that the release withholds.

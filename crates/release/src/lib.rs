@@ -6,7 +6,7 @@
 //!
 //! [`CheckedRelease::new`] reads and checks everything that is given ([`comparisons`], [`reference_scores`]) before
 //! [`CheckedRelease::write`] verifies the dataset and gathers the rest: counts beside the paper's ([`table_one`]), the noise
-//! of the truth ([`truth_renders`]), licences and hashes of the inputs ([`inputs`]), commands ([`remake`]), the citation
+//! of the photo's renderer ([`truth_renders`]), licences and hashes of the inputs ([`inputs`]), commands ([`remake`]), the citation
 //! ([`publication`]) and pictures ([`thumbnails`]). If the ground truth is withheld, `withholding` removes what was measured
 //! on it. `page` and the files beside it fill the template.
 //!

@@ -7,7 +7,7 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use crate::file::ReleaseFile;
-use crate::page_scene::{SHOWN_SCORES, ScenePage, state_words};
+use crate::page_scene::{SHOWN_SCORES, ScenePage};
 use crate::page_summary::{failures, headlines, not_given, whole_findings};
 use crate::reference_scores::ReferenceScores;
 use crate::table_one;
@@ -22,7 +22,6 @@ const OPEN: &str = include_str!("open.js");
 struct Bound<'a> {
     name: &'static str,
     scores: &'a ReferenceScores,
-    noise: String,
 }
 
 /// The page.
@@ -56,14 +55,7 @@ pub(crate) fn page(file: &ReleaseFile) -> String {
 
 fn bounds(file: &ReleaseFile) -> Vec<Bound<'_>> {
     let both = [("ceiling", &file.ceiling), ("floor", &file.floor)];
-    both.into_iter()
-        .filter_map(|(name, scores)| {
-            let scores = scores.as_ref()?;
-            let noise =
-                scores.noise_states.iter().map(|count| format!("{} {}", count.scores, state_words(count.state)));
-            Some(Bound { name, scores, noise: noise.collect::<Vec<_>>().join(", ") })
-        })
-        .collect()
+    both.into_iter().filter_map(|(name, scores)| Some(Bound { name, scores: scores.as_ref()? })).collect()
 }
 
 /// The hash by which the page's policy allows the text of an element.

@@ -3,7 +3,6 @@
 use mateval_audit::compare::file::State;
 use mateval_audit::stats::SceneStats;
 use mateval_eval::metric::Metric;
-use mateval_eval::result::NoiseState;
 use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces, Views};
 use mateval_scene::scene_cost::{Step, StepCost};
 use mateval_scene::{Finding, Severity};
@@ -59,7 +58,7 @@ pub(crate) struct ScenePage<'a> {
     views: Vec<[String; 3]>,
     steps: Vec<[String; 4]>,
     all_scores: Vec<[String; 3]>,
-    truth_noise: Vec<String>,
+    ceiling_errors: Vec<String>,
 }
 
 impl<'a> ScenePage<'a> {
@@ -89,7 +88,7 @@ impl<'a> ScenePage<'a> {
             views: views(scene),
             steps: scene.costs.iter().map(step).collect(),
             all_scores: all_scores(file, scene),
-            truth_noise: truth_noise(file, scene),
+            ceiling_errors: ceiling_errors(file, scene),
         }
     }
 
@@ -233,7 +232,7 @@ fn step(cost: &StepCost) -> [String; 4] {
         (Step::Build, _) => "build".to_owned(),
         (Step::Render, Some(renderer)) => format!("render, {renderer}"),
         (Step::Render, None) => "render".to_owned(),
-        (Step::Companions, _) => "companions".to_owned(),
+        (Step::Scorer, _) => "scorer's reference".to_owned(),
     };
     let cpu = cost.cpu_seconds.map_or_else(|| "not known".to_owned(), duration);
     [name, cost.runs.to_string(), duration(cost.wall_seconds), cpu]
@@ -261,23 +260,10 @@ pub(crate) fn title(key: ResultKey) -> String {
     format!("{}, {}", key.picture.kind.title(), key.views.title().to_lowercase())
 }
 
-/// The part of the ceiling's uncertainty that is due to the noise of the truth, for each score of light.
-fn truth_noise(file: &ReleaseFile, scene: &ReleasedScene) -> Vec<String> {
+/// The standard error of each score of light of the ceiling that has one.
+fn ceiling_errors(file: &ReleaseFile, scene: &ReleasedScene) -> Vec<String> {
     let noise = file.ceiling.as_ref().and_then(|scores| scores.noise.as_ref()?.get(&scene.scene));
     let is_shown = |key: &ResultKey| key.picture.surfaces == Surfaces::All;
-    let line = |(key, noise): (&ResultKey, &mateval_eval::result::PsnrNoise)| {
-        let error = noise.truth_db.map_or_else(|| "not known".to_owned(), |db| format!("{db:.3} dB"));
-        format!("{}: {error}, {}", title(*key), state_words(noise.state))
-    };
+    let line = |(key, error): (&ResultKey, &f64)| format!("{}: {error:.3} dB", title(*key));
     noise.into_iter().flatten().filter(|(key, _)| is_shown(key)).map(line).collect()
-}
-
-/// What a state of noise means.
-pub(crate) fn state_words(state: NoiseState) -> &'static str {
-    match state {
-        NoiseState::Certified => "certified",
-        NoiseState::LimitedByTruth => "limited by the truth",
-        NoiseState::SampleCap => "at the most samples",
-        NoiseState::AboveTarget => "above the bound",
-    }
 }

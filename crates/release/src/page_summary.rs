@@ -88,7 +88,7 @@ fn noise(file: &ReleaseFile) -> Headline {
         [] => "not rendered".to_owned(),
         _ => format!("{:.1} dB", worst[worst.len() / 2]),
     };
-    plain(value, "noise of the truth: PSNR of a scene's noisiest view, median of the scenes".to_owned())
+    plain(value, "noise of the photo's renderer: PSNR of a scene's noisiest view, median of the scenes".to_owned())
 }
 
 fn cost(file: &ReleaseFile) -> Headline {

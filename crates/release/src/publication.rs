@@ -115,8 +115,8 @@ mod tests {
 
     fn dataset(name: &str) -> DatasetFile {
         let text = serde_json::json!({
-            "format": "mateval/2", "name": name, "version": "1.0", "tool": "mateval 0", "scenes": [],
-            "scored_renderer": null, "licences": [], "manifest_sha256": "0123456789abcdef",
+            "format": "mateval/3", "name": name, "version": "1.0", "tool": "mateval 0", "scenes": [],
+            "photo_renderer": null, "licences": [], "manifest_sha256": "0123456789abcdef",
         });
         serde_json::from_value(text).unwrap()
     }

@@ -3,19 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_eval::result::{NoiseState, ProtocolResult, PsnrNoise, RESULT_FORMAT, ResultFile};
+use mateval_eval::EvalError;
+use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::result_key::ResultKey;
 use mateval_scene::open::Dataset;
-use mateval_scene::{Finding, SceneId, json};
+use mateval_scene::{Finding, SceneId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ReleaseError;
 use crate::unfit::{fitting, foreign, unfit};
-
-/// All states of noise, in the order in which they are counted.
-const STATES: [NoiseState; 4] =
-    [NoiseState::Certified, NoiseState::LimitedByTruth, NoiseState::SampleCap, NoiseState::AboveTarget];
 
 /// The scores of one submission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -37,28 +34,16 @@ pub struct ReferenceScores {
     pub scenes_scored: usize,
     /// Means over these scenes.
     pub summary: BTreeMap<ResultKey, f64>,
-    /// The number of scores of light in each state of their noise that occurs.
-    pub noise_states: Vec<NoiseStateCount>,
+    /// Standard errors of the means of PSNR of light due to render noise, in dB.
+    pub summary_noise: BTreeMap<ResultKey, f64>,
     /// The scores of each scene; null where the ground truth is withheld.
     pub scenes: Option<BTreeMap<SceneId, BTreeMap<ResultKey, f64>>>,
-    /// The noise of the scores of light of each scene; null where the ground truth is withheld.
-    pub noise: Option<BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>>,
-}
-
-/// The number of scores of light in one state of their noise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NoiseStateCount {
-    /// The state.
-    pub state: NoiseState,
-    /// The number of scores.
-    pub scores: usize,
+    /// Standard errors of the PSNR of light of each scene, in dB; null where the ground truth is withheld.
+    pub noise: Option<BTreeMap<SceneId, BTreeMap<ResultKey, f64>>>,
 }
 
 impl ReferenceScores {
     fn new(result: &ResultFile, scores: &ProtocolResult) -> Self {
-        let states = || scores.noise.values().flat_map(BTreeMap::values).map(|noise| noise.state);
-        let count = |state| NoiseStateCount { state, scores: states().filter(|found| *found == state).count() };
         Self {
             tool: result.tool.clone(),
             method: result.method.clone(),
@@ -68,7 +53,7 @@ impl ReferenceScores {
             fingerprint: scores.fingerprint.clone(),
             scenes_scored: result.dataset.scenes.len(),
             summary: scores.summary.clone(),
-            noise_states: STATES.map(count).into_iter().filter(|count| count.scores > 0).collect(),
+            summary_noise: scores.summary_noise.clone(),
             scenes: Some(scores.scenes.clone()),
             noise: Some(scores.noise.clone()),
         }
@@ -90,8 +75,8 @@ pub struct Bounds {
 }
 
 /// Reads the results of the ceiling and the floor under the protocol. Fails with every reason for which one of them does not
-/// fit: it is something else, was made on another dataset, contradicts its fingerprint, or has no scores under the protocol;
-/// or both depend on different rules.
+/// fit: it is something else, was made on another dataset, contradicts its own numbers or its fingerprint, or has no scores
+/// under the protocol; or both depend on different rules.
 pub fn read(
     ceiling: Option<&Path>,
     floor: Option<&Path>,
@@ -123,7 +108,15 @@ fn result(
     dataset: &Dataset,
     findings: &mut Vec<Finding>,
 ) -> Result<Option<Scored>, ReleaseError> {
-    let read = json::read_format::<ResultFile>(path, RESULT_FORMAT);
+    let read = match ResultFile::read(path) {
+        Ok(result) => Ok(result),
+        Err(EvalError::Dataset(error)) => Err(error),
+        Err(EvalError::Contradiction { place, said, found, .. }) => {
+            findings.push(unfit(path, &place, format!("it states {said}, but its own numbers give {found}")));
+            return Ok(None);
+        }
+        Err(other) => return Err(other.into()),
+    };
     let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
     let before = findings.len();
     findings.extend(foreign(path, &result.dataset.manifest_sha256, dataset));
@@ -143,9 +136,9 @@ fn result(
 /// A finding if the result lists no scene, or one that the dataset does not have or another renderer.
 fn unknown_scenes(path: &Path, result: &ResultFile, dataset: &Dataset) -> Option<Finding> {
     let known = &dataset.file.scenes;
-    if result.dataset.scored_renderer != dataset.file.scored_renderer {
+    if result.dataset.photo_renderer != dataset.file.photo_renderer {
         let message = "light was compared with the pictures of another renderer".to_owned();
-        return Some(unfit(path, "/dataset/scored_renderer", message));
+        return Some(unfit(path, "/dataset/photo_renderer", message));
     }
     let scenes = &result.dataset.scenes;
     let is_part = known.iter().filter(|id| scenes.contains(id)).eq(scenes) && !scenes.is_empty();
@@ -164,6 +157,5 @@ fn changed(path: &Path, result: &ResultFile, protocol: &str, scores: &ProtocolRe
 /// The fingerprint for these scenes; without scenes, a hash of everything else that scores depend on.
 fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
     let weights = result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
-    let dataset = &result.dataset;
-    scores.protocol.fingerprint(&dataset.manifest_sha256, scenes, dataset.scored_renderer.as_ref(), weights)
+    scores.protocol.fingerprint(&result.dataset.manifest_sha256, scenes, weights)
 }

@@ -150,7 +150,7 @@ fn released(dataset: &Dataset) -> ReleasedDataset {
         name: dataset.file.name.clone(),
         version: dataset.file.version.clone(),
         manifest_sha256: dataset.file.manifest_sha256.clone(),
-        scored_renderer: dataset.file.scored_renderer.clone(),
+        photo_renderer: dataset.file.photo_renderer.clone(),
     }
 }
 

@@ -1,8 +1,11 @@
 //! The commands that make a release again from its recipe and sources.
 
+use mateval_eval::light::reference::RELEASE_SAMPLES;
 use mateval_prep::recipe::{self, RECIPE};
-use mateval_scene::manifest::{self, sha256_of_bytes};
+use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::open::Dataset;
+use mateval_scene::scorer_file::ScorerFile;
+use mateval_scene::{SceneId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,8 +38,6 @@ impl Remake {
             .collect();
         let mut commands = build(dataset, &left_out);
         commands.extend(rendered.iter().map(|one| render(one, recipe.samples, dataset)));
-        let has_companions = manifest::entries(&dataset.root)?.iter().any(|entry| entry.file.contains("/companions/"));
-        commands.extend(has_companions.then(|| "mateval prep companions DATASET".to_owned()));
         commands.push("sha256sum DATASET/MANIFEST.sha256".to_owned());
         let recipe_sha256 = sha256_of_bytes(text.as_bytes());
         Ok(Self { tool: dataset.file.tool.clone(), recipe_sha256, recipe: text, commands })
@@ -54,13 +55,25 @@ fn build(dataset: &Dataset, left_out: &[&str]) -> Vec<String> {
     vec![format!("{whole}{scenes}"), format!("mateval prep finish DATASET{without}")]
 }
 
+/// The command makes the scorer's references of the scenes too, if they exist.
 fn render(with: &RenderedWith, recipe_samples: u32, dataset: &Dataset) -> String {
     let samples = with.samples_each_half;
     let samples = if samples == recipe_samples { String::new() } else { format!(" --samples {samples}") };
     let is_whole = with.scenes.len() == dataset.file.scenes.len();
     let scenes = if is_whole { String::new() } else { options("scene", with.scenes.iter().map(|id| id.as_str())) };
     let finish = if is_whole { "" } else { " && mateval prep finish DATASET" };
-    format!("mateval prep render DATASET --renderer {}{samples}{scenes}{finish}", with.renderer)
+    let reference = reference(dataset, &with.scenes);
+    format!("mateval prep render DATASET --renderer {}{samples}{reference}{scenes}{finish}", with.renderer)
+}
+
+/// The options that make the scenes' references as they are, which have the same number of samples.
+fn reference(dataset: &Dataset, scenes: &[SceneId]) -> String {
+    let file = |scene: &SceneId| json::read::<ScorerFile>(&dataset.folder(scene).scorer_file()).ok();
+    match scenes.first().map(|scene| file(scene).map(|file| file.samples_each_half)) {
+        Some(None) => " --only photo".to_owned(),
+        Some(Some(samples)) if samples != RELEASE_SAMPLES => format!(" --scorer-samples {samples}"),
+        _ => String::new(),
+    }
 }
 
 /// ` --NAME ID` for each id.

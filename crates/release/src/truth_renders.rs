@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::ReleaseError;
 
-/// The noise of one view of the scored renderer.
+/// The noise of one view of the photo's renderer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ViewNoise {
@@ -82,7 +82,7 @@ fn add(all: &mut Vec<RenderedWith>, scene: &SceneId, file: RenderFile) {
 
 /// The noise of a scene's views; none where the scene is not rendered.
 pub(crate) fn noise(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Vec<ViewNoise>>, ReleaseError> {
-    let Some(renderer) = dataset.scored_renderer(scene) else { return Ok(None) };
+    let Some(renderer) = dataset.photo_renderer(scene) else { return Ok(None) };
     let mut views = Vec::new();
     for view in &scene.views {
         if let Some(file) = render_file(dataset, scene, renderer, &view.id)? {

@@ -38,5 +38,6 @@ fn only_means(scores: &mut ReferenceScores) {
     if scores.scenes_scored < 2 {
         scores.summary.clear();
     }
+    scores.summary_noise.retain(|key, _| scores.summary.contains_key(key));
     scores.noise = None;
 }

@@ -58,12 +58,6 @@ pub enum ReportError {
         /// The folder of the submission.
         path: PathBuf,
     },
-    /// The dataset holds no renders to compare renders of a submission with: render them.
-    #[error("the dataset '{}' has no renders to compare with; run `mateval prep render DATASET`", dataset.display())]
-    NoRenders {
-        /// The folder of the dataset.
-        dataset: PathBuf,
-    },
     /// The track `relit` has several pictures for each view, and none of them can be chosen: show another track.
     #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,

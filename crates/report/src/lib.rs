@@ -15,6 +15,5 @@ pub mod picture_set;
 pub mod ranking;
 pub mod strips;
 pub mod tables;
-mod truth_noise;
 
 pub use error::ReportError;

@@ -34,13 +34,13 @@ pub struct MaskedValues {
     pub mse: Option<f64>,
     /// Its PSNR, dB.
     pub psnr: Option<f64>,
-    /// SSIM over the windows that lie wholly inside the mask (`mateval-2`).
+    /// SSIM over the windows that lie wholly inside the mask (`mateval-3`).
     pub ssim_inside: Option<f64>,
     /// The number of those windows.
     pub ssim_windows: usize,
     /// SSIM of both pictures blacked out outside (`paper`).
     pub ssim_black_fill: Option<f64>,
-    /// LPIPS of the prediction with the reference's pixels outside, over the mask's pixels (`mateval-2`).
+    /// LPIPS of the prediction with the reference's pixels outside, over the mask's pixels (`mateval-3`).
     pub lpips_inside: Vec<NetValue>,
     /// LPIPS of both pictures blacked out outside (`paper`).
     pub lpips_black_fill: Vec<NetValue>,

@@ -11,7 +11,7 @@ use mateval_scene::work_folder::check_free;
 use mateval_scene::{Progress, Report, SceneError, SceneId};
 
 use crate::error::ReportError;
-use mateval_eval::light_rules::Track;
+use mateval_eval::light::rules::{SampleRules, Track};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result_key::PictureKind;
 use mateval_eval::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
@@ -32,7 +32,7 @@ pub(crate) const SCALE_ROWS: usize = 12;
 pub enum Shown {
     /// base_color, with errors of linear values.
     Albedo,
-    /// Renders under a track of protocol `mateval-2`, with errors of sRGB values. Not [`Track::Relit`], which has
+    /// Renders under a track of the protocol that has it, with errors of sRGB values. Not [`Track::Relit`], which has
     /// several lights.
     Light {
         /// The track.
@@ -134,12 +134,11 @@ pub(crate) fn rows(
         Shown::Albedo => Ok(scene_albedo(plan.dataset, scene, plan.submissions)?.into_iter().map(albedo_row).collect()),
         Shown::Light { track: Track::Relit, .. } => Err(ReportError::RelitTrack),
         Shown::Light { track, samples } => {
-            let mut protocol = Protocol::named("mateval-2")?;
+            let mut protocol = Protocol::named(if track == Track::Fitted { "paper" } else { "mateval-3" })?;
             protocol.light.tracks = vec![track];
-            (protocol.light.noise.least_samples, protocol.light.noise.most_samples) = (samples, samples);
-            let renderer = plan.dataset.file.scored_renderer.as_ref();
-            let renderer = renderer.ok_or_else(|| ReportError::NoRenders { dataset: plan.dataset.root.clone() })?;
-            let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, renderer, progress)?;
+            protocol.light.samples =
+                SampleRules { at_320x240: samples, least: samples, most: samples, ..protocol.light.samples };
+            let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, progress)?;
             Ok(views.into_iter().map(light_row).collect())
         }
     }
@@ -155,7 +154,7 @@ fn albedo_row(view: SceneAlbedo) -> StripRow {
 }
 
 fn light_row(view: SceneLight) -> StripRow {
-    let shown: Vec<Picture<SrgbRgb>> = std::iter::once(view.shown.truth).chain(view.shown.predicted).collect();
+    let shown: Vec<Picture<SrgbRgb>> = std::iter::once(view.reference).chain(view.predicted).collect();
     let compared = shown.iter().map(|picture| picture.map(|SrgbRgb(rgb)| rgb)).collect();
     StripRow { truth: view.truth, shown, compared }
 }

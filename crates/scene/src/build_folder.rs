@@ -91,6 +91,11 @@ impl BuildFolder {
         Lease::wait(&self.0.join("leases/start"), "the start of the build")
     }
 
+    /// The right to write the dataset's `compare.json`; waits for other processes, which need it for a moment.
+    pub fn lease_of_verdict(&self) -> Result<Lease, SceneError> {
+        Lease::wait(&self.0.join("leases/verdict"), "the dataset's compare.json")
+    }
+
     fn scene_lease(&self, scene: &SceneId) -> (PathBuf, String) {
         (self.0.join("leases/scenes").join(scene.as_str()), format!("scene '{scene}'"))
     }

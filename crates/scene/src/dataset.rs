@@ -11,13 +11,16 @@ use crate::perturbation::{Perturbation, PerturbedGeometry};
 use crate::role::{Role, SceneLights, SourceKind};
 
 /// The name of this version of the format.
-pub const FORMAT: &str = "mateval/2";
+pub const FORMAT: &str = "mateval/3";
+
+/// The version before it, which `mateval prep render --only scorer` brings up to date.
+pub const PREVIOUS_FORMAT: &str = "mateval/3";
 
 /// `dataset.json`: what this dataset is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// The dataset's name, from its recipe.
     pub name: String,
@@ -27,9 +30,9 @@ pub struct DatasetFile {
     pub tool: String,
     /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
     pub scenes: Vec<SceneId>,
-    /// The renderer of the reference pictures, which are also shown as `input/rgb`; null until all scenes without a photo
-    /// from elsewhere are rendered, and where all scenes have one.
-    pub scored_renderer: Option<RendererId>,
+    /// The renderer that made the input pictures (`input/rgb`); null until all scenes without a photo from elsewhere are
+    /// rendered, and where all scenes have one.
+    pub photo_renderer: Option<RendererId>,
     /// Licence and credit of every scene.
     pub licences: Vec<Licence>,
     /// How its geometry differs from that of the dataset on which submissions are scored; absent where it is the true
@@ -68,7 +71,7 @@ pub struct Licence {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetsFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// One entry for each picture.
     pub targets: Vec<Target>,
@@ -88,7 +91,7 @@ pub struct Target {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// The scene's id.
     pub id: SceneId,

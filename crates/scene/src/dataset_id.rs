@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::{SceneFile, WideView};
 use crate::open::Dataset;
-use crate::{RendererId, SceneId, ViewId};
+use crate::{RendererId, SceneId, SourceKind, ViewId};
 
 /// The dataset and the scenes that were scored or checked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,12 +26,15 @@ pub struct DatasetId {
     /// The house of each scored scene. Rankings draw scenes of one house together.
     #[serde(default)]
     pub houses: BTreeMap<SceneId, String>,
+    /// The kind of source of each scored scene. Tables of protocol `paper` keep them apart.
+    #[serde(default)]
+    pub sources: BTreeMap<SceneId, SourceKind>,
     /// The views from other places than the input view's, by scene.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub wide_views: BTreeMap<SceneId, BTreeMap<ViewId, WideView>>,
-    /// The renderer whose pictures were the reference for light; null without such pictures.
+    /// The renderer that made the input pictures; null where none made all of them.
     #[serde(default)]
-    pub scored_renderer: Option<RendererId>,
+    pub photo_renderer: Option<RendererId>,
 }
 
 impl DatasetId {
@@ -45,8 +48,9 @@ impl DatasetId {
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
             total_scenes: dataset.file.scenes.len(),
             houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
+            sources: scenes.iter().map(|scene| (scene.id.clone(), scene.source.kind)).collect(),
             wide_views: scenes.iter().filter_map(|scene| Some((scene.id.clone(), wide_views(scene)?))).collect(),
-            scored_renderer: dataset.file.scored_renderer.clone(),
+            photo_renderer: dataset.file.photo_renderer.clone(),
         }
     }
 }

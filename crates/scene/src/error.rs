@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use mateval_image::owner::Owner;
 
+use crate::dataset::{FORMAT, PREVIOUS_FORMAT};
 use crate::ids::quoted;
 use crate::layout::DATASET;
 use crate::{Finding, SceneId};
@@ -87,9 +88,8 @@ pub enum SceneError {
     },
     /// A file of another version than the one that is read here.
     #[error(
-        "'{}' has the format '{found}', and this version of MatEval reads '{expected}': make the file again, or use the \
-         version that made it",
-        path.display()
+        "'{}' has the format '{found}', and this version of MatEval reads '{expected}': {}",
+        path.display(), remedy(found, expected)
     )]
     Format {
         /// The file.
@@ -148,6 +148,14 @@ impl SceneError {
     pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { action, path, source }
+    }
+}
+
+/// What helps where a file has another format than the one that is read.
+fn remedy(found: &str, expected: &str) -> &'static str {
+    match (found, expected) {
+        (PREVIOUS_FORMAT, FORMAT) => "`mateval prep render --only scorer DATASET` brings the dataset up to date",
+        _ => "make the file again, or use the version that made it",
     }
 }
 

@@ -1,5 +1,6 @@
 //! Reads and writes JSON files, with the same bytes on every machine and with path, line and column of every fault.
 
+use std::io::{self, Write};
 use std::path::Path;
 
 use mateval_image::file_kind::{hint, without_mark};
@@ -7,6 +8,7 @@ use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::ser::{Formatter, PrettyFormatter};
 use serde_path_to_error::Segment;
 
 use crate::findings::shortened;
@@ -26,6 +28,72 @@ pub fn to_text<T: Serialize>(value: &T) -> String {
 /// Writes the file whole.
 pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
     Ok(write_whole(path, to_text(value).as_bytes())?)
+}
+
+/// JSON in which each element of a list has one line, with a closing newline: for files of long lists.
+pub fn to_lines<T: Serialize>(value: &T) -> String {
+    let mut text = Vec::new();
+    let mut writer = serde_json::Serializer::with_formatter(&mut text, InLines::default());
+    value.serialize(&mut writer).expect("our types can be written as JSON");
+    text.push(b'\n');
+    String::from_utf8(text).expect("JSON is UTF-8")
+}
+
+/// Writes the file whole, as [`to_lines`].
+pub fn write_lines<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
+    Ok(write_whole(path, to_lines(value).as_bytes())?)
+}
+
+/// Pretty outside of lists, and compact inside of their elements.
+#[derive(Default)]
+struct InLines {
+    pretty: PrettyFormatter<'static>,
+    /// Lists around the place that is written.
+    lists: usize,
+}
+
+impl Formatter for InLines {
+    fn begin_array<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.lists += 1;
+        if self.lists > 1 { writer.write_all(b"[") } else { self.pretty.begin_array(writer) }
+    }
+
+    fn end_array<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.lists -= 1;
+        if self.lists > 0 { writer.write_all(b"]") } else { self.pretty.end_array(writer) }
+    }
+
+    fn begin_array_value<W: ?Sized + Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        if self.lists > 1 { separate(writer, first) } else { self.pretty.begin_array_value(writer, first) }
+    }
+
+    fn end_array_value<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.lists > 1 { Ok(()) } else { self.pretty.end_array_value(writer) }
+    }
+
+    fn begin_object<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.lists > 0 { writer.write_all(b"{") } else { self.pretty.begin_object(writer) }
+    }
+
+    fn end_object<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.lists > 0 { writer.write_all(b"}") } else { self.pretty.end_object(writer) }
+    }
+
+    fn begin_object_key<W: ?Sized + Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        if self.lists > 0 { separate(writer, first) } else { self.pretty.begin_object_key(writer, first) }
+    }
+
+    fn begin_object_value<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.pretty.begin_object_value(writer)
+    }
+
+    fn end_object_value<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.lists > 0 { Ok(()) } else { self.pretty.end_object_value(writer) }
+    }
+}
+
+fn separate<W: ?Sized + Write>(writer: &mut W, first: bool) -> io::Result<()> {
+    if first { Ok(()) } else { writer.write_all(b", ") }
 }
 
 /// Reads a file; what does not fit is an error with its JSON pointer, line and column.
@@ -107,6 +175,18 @@ mod tests {
     }
 
     #[test]
+    fn elements_of_lists_have_a_line_each() {
+        let value =
+            serde_json::json!({"a": {"b": 1}, "empty": [], "list": [{"c": [1, 2], "d": {"e": null}}, {"c": []}]});
+        let expected = concat!(
+            "{\n  \"a\": {\n    \"b\": 1\n  },\n  \"empty\": [],\n  \"list\": [\n",
+            "    {\"c\": [1, 2], \"d\": {\"e\": null}},\n    {\"c\": []}\n  ]\n}\n"
+        );
+        assert_eq!(to_lines(&value), expected);
+        assert_eq!(serde_json::from_str::<serde_json::Value>(expected).unwrap(), value);
+    }
+
+    #[test]
     fn faults_carry_their_json_pointer() {
         type Nested = std::collections::BTreeMap<String, Vec<std::collections::BTreeMap<String, u8>>>;
         for (text, expected) in
@@ -128,12 +208,12 @@ mod tests {
     #[test]
     fn another_format_is_named_before_any_other_fault() {
         let parsed = |text: &str| {
-            let result = parse_format::<crate::dataset::TargetsFile>(Path::new("t"), text.as_bytes(), "mateval/2");
+            let result = parse_format::<crate::dataset::TargetsFile>(Path::new("t"), text.as_bytes(), "mateval/3");
             result.map(|_| ()).map_err(|error| error.to_string())
         };
         let other = parsed(r#"{"an_unknown_key": 3, "format": "other/2"}"#).unwrap_err();
-        assert!(other.contains("'other/2'") && other.contains("'mateval/2'"), "{other}");
-        for text in ["[]", "{", "{}", r#"{"format": 3}"#, r#"{"format": "mateval/2", "an_unknown_key": 3}"#] {
+        assert!(other.contains("'other/2'") && other.contains("'mateval/3'"), "{other}");
+        for text in ["[]", "{", "{}", r#"{"format": 3}"#, r#"{"format": "mateval/3", "an_unknown_key": 3}"#] {
             let error = parsed(text).unwrap_err();
             assert!(error.contains("bad_json"), "{text}: {error}");
         }

@@ -10,6 +10,11 @@ pub const DATASET: &str = "dataset.json";
 pub const TARGETS: &str = "targets.json";
 /// `MANIFEST.sha256`.
 pub const MANIFEST: &str = "MANIFEST.sha256";
+/// `compare.json`: a verdict about the dataset, which its identity does not cover.
+pub const COMPARE: &str = "compare.json";
+/// The list of a scene's references in `ground_truth/renders/scorer`. It is written last, so its presence means that the
+/// pictures are complete.
+pub const SCORER_JSON: &str = "scorer.json";
 /// The input view's id.
 pub const INPUT: &str = "input";
 
@@ -29,6 +34,12 @@ pub fn part_picture(set: Option<&PartSetId>) -> String {
 pub fn is_ground_truth(file: &str) -> bool {
     let mut parts = file.split('/');
     parts.next() == Some("scenes") && parts.nth(1) == Some("ground_truth")
+}
+
+/// Whether a file, by its path in the dataset or in its scene's folder, is made by rendering other files of the scene.
+pub fn is_rendered(file: &str) -> bool {
+    // Scenes and instances may be named `renders` too.
+    file.contains("/ground_truth/renders/") || file.starts_with("ground_truth/renders/")
 }
 
 /// The paths of one scene.
@@ -91,9 +102,14 @@ impl SceneFolder {
         self.truth().join("renders").join(renderer.as_str()).join(view.as_str())
     }
 
-    /// `ground_truth/companions`: converged pictures that scoring compares every prediction's paths with.
-    pub fn companions(&self) -> PathBuf {
-        self.truth().join("companions")
+    /// `ground_truth/renders/scorer`: the scorer's own pictures of the true maps. It is no renderer of photos.
+    pub fn scorer(&self) -> PathBuf {
+        self.truth().join("renders/scorer")
+    }
+
+    /// `ground_truth/renders/scorer/scorer.json`.
+    pub fn scorer_file(&self) -> PathBuf {
+        self.scorer().join(SCORER_JSON)
     }
 
     /// `ground_truth/lights.json`.

@@ -11,7 +11,7 @@
 pub mod bounded_cache;
 pub mod build_folder;
 pub mod camera;
-pub mod companions_file;
+pub mod compare_file;
 pub mod dataset;
 pub mod dataset_id;
 pub mod error;
@@ -42,6 +42,7 @@ pub mod role;
 pub mod scene_change;
 pub mod scene_cost;
 pub mod scene_hashes;
+pub mod scorer_file;
 pub mod source_folder;
 pub mod source_materials;
 pub mod specular_glossiness;

@@ -8,7 +8,7 @@ use mateval_image::store::write_whole;
 use mateval_image::temporary::{is_abandoned, is_temporary};
 use sha2::{Digest as _, Sha256};
 
-use crate::layout::{DATASET, MANIFEST};
+use crate::layout::{COMPARE, DATASET, MANIFEST};
 use crate::{Finding, SceneError, Severity, work_folder};
 
 /// The code of a finding about a file that the manifest lists and the dataset lacks.
@@ -38,11 +38,12 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The files below `root`, relative and sorted, without the manifest, `dataset.json` and hidden files in `root` itself.
+/// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files in
+/// `root` itself.
 /// Links to folders are not followed.
 pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
     let mut files = list_below(root, Path::new(""))?;
-    files.retain(|file| file != MANIFEST && file != DATASET && !file.starts_with('.'));
+    files.retain(|file| ![MANIFEST, DATASET, COMPARE].contains(&file.as_str()) && !file.starts_with('.'));
     Ok(files)
 }
 

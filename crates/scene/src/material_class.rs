@@ -75,7 +75,7 @@ impl fmt::Display for MaterialClass {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialClassesFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// In the order of `parts` of `scene.json`.
     pub parts: Vec<ClassifiedPart>,

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_image::temporary::is_temporary;
+
 use crate::build_folder::BuildFolder;
 use crate::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use crate::ids::{RendererId, SceneId};
@@ -40,7 +42,10 @@ impl Dataset {
             return Err(SceneError::Unsupported { path, what });
         }
         let absent = absent_scenes(root, &file)?;
-        let is_scene = |path: &str| path.starts_with("scenes/") && path.ends_with("/scene.json");
+        // What a lost process left unfinished is no scene.
+        let is_scene = |path: &str| {
+            path.starts_with("scenes/") && path.ends_with("/scene.json") && !path.split('/').any(is_temporary)
+        };
         check_hashes(root, |path| path == TARGETS || (is_scene(path) && !is_below(path, &absent)))?;
         let mut faults = Vec::new();
         let targets = read_targets(root).map_err(|fault| faults.push((TARGETS.to_owned(), fault))).ok();
@@ -99,10 +104,10 @@ impl Dataset {
         Ok(chosen[0])
     }
 
-    /// The renderer of the scene's reference pictures; none where the dataset has no scored renderer, or where the scene
-    /// has a photo from elsewhere, whose light is not known.
-    pub fn scored_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
-        self.file.scored_renderer.as_ref().filter(|_| scene.photo.is_none())
+    /// The renderer that made the scene's input picture; none where the dataset has no photo renderer, or where the scene has
+    /// a photo from elsewhere, whose light is not known.
+    pub fn photo_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
+        self.file.photo_renderer.as_ref().filter(|_| scene.photo.is_none())
     }
 
     /// The scene's folder.
@@ -248,7 +253,7 @@ mod tests {
             version: String::new(),
             tool: String::new(),
             scenes: vec![room.clone(), hall.clone()],
-            scored_renderer: None,
+            photo_renderer: None,
             licences: Vec::new(),
             geometry: None,
             manifest_sha256: String::new(),

@@ -23,7 +23,7 @@ use crate::{Finding, SceneError, Severity, json};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// In the order of the nodes of `geometry.glb`.
     pub surfaces: Vec<SurfaceEntry>,
@@ -37,7 +37,7 @@ pub struct ReferenceFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceMaterialsFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// In the order of `materials` of `reference.json`.
     pub materials: Vec<Material>,
@@ -125,7 +125,7 @@ impl From<WrapWord> for Wrap {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightsFile {
-    /// Always `mateval/2`.
+    /// Always `mateval/3`.
     pub format: String,
     /// The groups of emitters; their surfaces and textures are indices of the lists in `reference.json`.
     pub groups: Vec<LightGroup>,

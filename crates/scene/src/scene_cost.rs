@@ -21,10 +21,10 @@ const COST_FORMAT: &str = "mateval-cost/1";
 pub enum Step {
     /// `prep build`.
     Build,
-    /// `prep render`.
+    /// `prep render`: the photo renderer's pictures.
     Render,
-    /// `prep companions`.
-    Companions,
+    /// `prep render`: the scorer's reference.
+    Scorer,
 }
 
 /// The cost of one step.

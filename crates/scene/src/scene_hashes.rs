@@ -9,6 +9,7 @@ use mateval_image::temporary::is_temporary;
 use serde::{Deserialize, Serialize};
 
 use crate::build_folder::BuildFolder;
+use crate::layout::is_rendered;
 use crate::manifest::{self, sha256_of_file};
 use crate::{Finding, SceneError, SceneId, json};
 
@@ -148,11 +149,12 @@ impl SceneHashes {
 
 /// The finding with the command that helps.
 fn with_advice(finding: Finding) -> Finding {
-    let action = match finding.file.contains("/renders/") || finding.file.contains("/companions/") {
-        true => {
-            "run `prep render` or `prep companions` again for this scene: it was cut off, or the file was changed by hand"
+    let action = match (is_rendered(&finding.file), finding.file.contains("/renders/scorer/")) {
+        (true, true) => {
+            "run `prep render --only scorer` for this scene: it was cut off, or the file was changed by hand"
         }
-        false => "make the scene again by `prep build --scene SCENE --force`: the file was changed by hand",
+        (true, false) => "run `prep render` again for this scene: it was cut off, or the file was changed by hand",
+        (false, _) => "make the scene again by `prep build --scene SCENE --force`: the file was changed by hand",
     };
     Finding { action: action.to_owned(), ..finding }
 }

@@ -220,7 +220,7 @@ mod tests {
                    "atlas": atlas})
         };
         serde_json::from_value(json!({
-            "format": "mateval/2", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
+            "format": "mateval/3", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
                        "states_metallic": true, "files": []},
             "lights": "own", "materials": "converted", "exposure": 1.0,
             "views": [], "instances": [instance("a", 1, true), instance("pane", 2, false), instance("b", 3, true)],

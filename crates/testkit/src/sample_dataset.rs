@@ -6,10 +6,12 @@ use std::sync::{Arc, LazyLock};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::{grey, submission, truth};
+use mateval_eval::light::reference::{ReferenceOptions, make_references};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 use mateval_prep::build::{BuildOptions, build};
+use mateval_prep::finish::finish_again;
 use mateval_prep::render::{RenderOptions, render};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
@@ -28,8 +30,16 @@ const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\nat
 static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     let out = built();
     render(&out, &RenderOptions::default(), &|_| ()).unwrap();
+    add_references(&out, 32);
     Dataset::open(&out).unwrap()
 });
+
+/// Renders the scorer's references of a dataset.
+pub fn add_references(root: &Path, samples: u32) {
+    let options = ReferenceOptions { samples, scenes: Vec::new(), force: false };
+    make_references(root, &options, &|_| ()).unwrap();
+    finish_again(root, &|_| ()).unwrap();
+}
 
 /// Builds the dataset without renders.
 pub fn built() -> PathBuf {

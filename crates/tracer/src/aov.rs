@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use mateval_scene::Camera;
+use mateval_scene::material::Appearance;
 use mateval_scene::reference::SurfaceIndex;
 
 use crate::accel::Hit;
@@ -45,6 +46,8 @@ pub struct PixelMean<const N: usize> {
     pub mean: [f32; N],
     /// Whether all places that were looked at show something.
     pub whole: bool,
+    /// The number of places that were looked at: [`COARSE_SUBPIXELS`] or [`SUBPIXELS`].
+    pub looked: usize,
 }
 
 impl<const N: usize> PixelMean<N> {
@@ -68,8 +71,26 @@ impl<const N: usize> PixelMean<N> {
             }
         }
         let mean = sum.map(|sum| if count == 0 { 0.0 } else { (sum / count as f64) as f32 });
-        Self { mean, whole: count == looked }
+        Self { mean, whole: count == looked, looked }
     }
+}
+
+/// base_color, roughness and metallic of a surface's own material at a place of a triangle.
+pub fn appearance(world: &World, surface: SurfaceIndex, triangle: usize, barycentrics: Vec3) -> Option<Appearance> {
+    let shown = &world.scene().surfaces[surface.0];
+    let uv = shown.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| {
+        let [a, b, c] = shown.mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
+        a * barycentrics.x + b * barycentrics.y + c * barycentrics.z
+    });
+    world.scene().materials[shown.material.0].appearance(world.textures(), uv)
+}
+
+/// The values of a pixel by which the truth decides how many of its places are looked at: base colour, its diffuse part,
+/// roughness and metallic.
+pub fn flatness_values(seen: &Appearance) -> [f32; 8] {
+    let [r, g, b] = seen.base_color;
+    let rest = 1.0 - seen.metallic;
+    [r, g, b, r * rest, g * rest, b * rest, seen.roughness, seen.metallic]
 }
 
 /// The first hit behind one point of a picture.
@@ -243,9 +264,12 @@ mod tests {
             });
             (count, mean)
         };
-        assert_eq!(looks(|_| Some(0.25)), (16, PixelMean { mean: [0.5, 0.25], whole: true }));
-        assert_eq!(looks(|at| Some((at % 2) as f32)), (64, PixelMean { mean: [0.5, 0.5], whole: true }));
-        assert_eq!(looks(|at| (at > 0).then_some(0.25)), (64, PixelMean { mean: [0.5, 0.25], whole: false }));
-        assert_eq!(looks(|_| None), (64, PixelMean { mean: [0.0, 0.0], whole: false }));
+        assert_eq!(looks(|_| Some(0.25)), (16, PixelMean { mean: [0.5, 0.25], whole: true, looked: 16 }));
+        assert_eq!(looks(|at| Some((at % 2) as f32)), (64, PixelMean { mean: [0.5, 0.5], whole: true, looked: 64 }));
+        assert_eq!(
+            looks(|at| (at > 0).then_some(0.25)),
+            (64, PixelMean { mean: [0.5, 0.25], whole: false, looked: 64 })
+        );
+        assert_eq!(looks(|_| None), (64, PixelMean { mean: [0.0, 0.0], whole: false, looked: 64 }));
     }
 }

@@ -140,14 +140,6 @@ pub enum RequestFault {
         /// The largest number on any surface; at least 1.
         expected: usize,
     },
-    /// The factors of base colours do not fit the predictions.
-    #[error("{found} factors of base colours for {expected} predictions; expected one from 0 to 1 for each")]
-    Scales {
-        /// How many factors there are.
-        found: usize,
-        /// How many predictions there are.
-        expected: usize,
-    },
     /// The second roughness and metallic are of other surfaces than the coats.
     #[error("the second roughness and metallic do not cover exactly the surfaces that have a coat")]
     SecondScattering,

@@ -1,6 +1,6 @@
 //! Takes the noise out of a render without blurring its textures.
 //!
-//! Light divided by the base colour of what it falls on is smooth over surfaces. It is filtered with the edge-avoiding
+//! Light is smooth over surfaces, divided by the base colour of what it falls on where it follows that. It is filtered with the edge-avoiding
 //! a-trous wavelets of Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering"
 //! (2010), whose weights follow the noise as in Schied et al., "Spatiotemporal Variance-Guided Filtering" (2017): pixels are
 //! averaged where they belong to one instance, face the same way, and differ by no more than noise explains. As samples
@@ -21,14 +21,18 @@ pub const DEVIATIONS: f32 = 4.0;
 /// The least cosine between the normals of pixels that are averaged.
 pub const LEAST_COSINE: f32 = 0.9;
 
+/// The weights of a pixel along a row or column, by its distance in steps: of a pass those up to 1, of the mean of variances
+/// all.
+pub const KERNEL: [f32; 4] = [0.5, 0.25, 0.125, 0.0625];
+
 /// The least base colour that light is divided by.
 pub const LEAST_BASE_COLOR: f32 = 0.05;
 
 /// What a view shows, without noise. All pictures have one size.
 #[derive(Clone, Copy)]
 pub struct Surfaces<'a> {
-    /// Linear. Light is divided by it.
-    pub base_color: &'a Picture<LinearRgb>,
+    /// Linear. Light is divided by it; none where what is filtered does not follow the base colour.
+    pub base_color: Option<&'a Picture<LinearRgb>>,
     /// Instance index of each pixel.
     pub instances: &'a Picture<u16>,
     /// In world space.
@@ -48,7 +52,10 @@ struct Light {
 /// are those of the mean. The pictures are as large as those of `surfaces`.
 pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) -> Picture<LinearRgb> {
     let (width, height) = (surfaces.valid.width(), surfaces.valid.height());
-    let divisor = |k: usize| surfaces.base_color.pixels()[k].0.map(|v| v.clamp(LEAST_BASE_COLOR, 1.0));
+    let divisor = |k: usize| match surfaces.base_color {
+        Some(base_color) => base_color.pixels()[k].0.map(|v| v.clamp(LEAST_BASE_COLOR, 1.0)),
+        None => [1.0; 3],
+    };
     let divided = |k: usize| {
         let divisor = divisor(k);
         let [a, b] = halves.map(|half| half.pixels()[k].0);
@@ -108,7 +115,7 @@ fn around<'g>(
         let is_alike = surfaces.valid.pixels()[there]
             && surfaces.instances.pixels()[there] == instance
             && (there == here || cosine >= LEAST_COSINE);
-        let weight = |distance: isize| [0.5, 0.25, 0.125, 0.0625][distance.unsigned_abs()];
+        let weight = |distance: isize| KERNEL[distance.unsigned_abs()];
         is_alike.then(|| (there, weight(dx) * weight(dy)))
     })
 }
@@ -168,7 +175,7 @@ mod tests {
     impl Planted {
         fn surfaces(&self) -> Surfaces<'_> {
             let Self { base_color, instances, normals, valid } = self;
-            Surfaces { base_color, instances, normals, valid }
+            Surfaces { base_color: Some(base_color), instances, normals, valid }
         }
 
         /// The floor under light that is brighter on the right instance, with noise of this size, in two halves.

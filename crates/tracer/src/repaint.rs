@@ -51,8 +51,6 @@ pub struct Repaint {
     /// One per surface; `None` keeps the world's own material.
     coats: Vec<Option<Coat>>,
     second: Option<SecondScattering>,
-    /// Factors of the base colours, one per prediction.
-    scales: Vec<f32>,
     /// The atlas uvs of all triangles of the world, surface by surface.
     uvs: Vec<[Vec2; 3]>,
     predictions: usize,
@@ -98,18 +96,7 @@ impl Repaint {
         let predictions = check_coats(&world.scene().surfaces, atlases, &coats)?;
         let uvs = atlases.iter().flat_map(corner_uvs).collect();
         let eta = eta_from_specular(SPECULAR);
-        let (second, scales) = (None, vec![1.0; predictions]);
-        Ok(Self { coats, second, scales, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
-    }
-
-    /// The same, with the base colours of each prediction multiplied by its entry of `scales`, each from 0 to 1. Fails
-    /// unless there is one for each prediction.
-    pub fn with_scales(self, scales: Vec<f32>) -> Result<Self, TracerError> {
-        let (found, expected) = (scales.len(), self.predictions);
-        if found != expected || !scales.iter().all(|scale| (0.0..=1.0).contains(scale)) {
-            return Err(RequestFault::Scales { found, expected }.into());
-        }
-        Ok(Self { scales, ..self })
+        Ok(Self { coats, second: None, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
     }
 
     /// The same, but predictions from number `from` on have the roughness and metallic of `of_surface`, which holds one
@@ -134,7 +121,7 @@ impl Repaint {
         from_fn(|k| {
             let which = (first + k).min(self.predictions - 1);
             let color = Vec3::from_array(coat.base_colors[which].sample(uv.to_array()));
-            color.clamp(Vec3::ZERO, Vec3::ONE) * self.scales[which]
+            color.clamp(Vec3::ZERO, Vec3::ONE)
         })
     }
 

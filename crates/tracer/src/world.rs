@@ -38,7 +38,7 @@ pub struct World {
 const SMALL_TEXTURE: usize = 1 << 16;
 
 /// Rows and columns of the rays that find what a camera sees, for [`World::with_group_shares`].
-const PROBES: u32 = 32;
+pub const PROBES: u32 = 32;
 
 impl World {
     /// Checks the scene and builds the hierarchy over all surfaces.

@@ -10,7 +10,7 @@ fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("RESULT.json", bytes, |path| {
         let Ok(result) = json::read::<ResultFile>(path) else { return };
         for grouping in [Grouping::Dataset, Grouping::Scene, Grouping::Category] {
-            let _ = tables(std::slice::from_ref(&result), None, "mateval-2", grouping, TableFormat::Latex);
+            let _ = tables(std::slice::from_ref(&result), None, "mateval-3", grouping, TableFormat::Latex);
         }
     });
 });

@@ -1,11 +1,12 @@
 //! Compares Blender's pictures of a dataset with those of the built-in tracer, view by view.
 //!
-//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`text`] prints as tables; and, on request, a folder
-//! that holds it and a page with both pictures side by side.
+//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`text`] prints as tables; its verdict, which is kept in
+//! the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
 //!
 //! Between: `theirs` reads Blender's pictures, `samples` decides how many samples ours take, and `ours` renders; `geometry`
-//! compares pictures without light, and `light` compares pictures of light by `tiles`. `kind` states which materials may differ, [`bounds`] how far. `source` compares
-//! converted materials with the source's own. `previews` and `page` show the result.
+//! compares pictures without light, and `light` compares pictures of light by `tiles`. `kind` states which materials may
+//! differ, [`bounds`] how far. `source` compares converted materials with the source's own. `previews` and `page` show the
+//! result.
 
 pub mod bounds;
 pub mod file;
@@ -23,11 +24,14 @@ pub mod text;
 mod theirs;
 mod tiles;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use mateval_scene::build_folder::BuildFolder;
+use mateval_scene::compare_file::{self, CompareCounts, VERDICT_FORMAT};
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::SceneFolder;
+use mateval_scene::layout::{COMPARE, SceneFolder};
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
@@ -48,9 +52,6 @@ use samples::PILOT;
 use theirs::{TheirView, file_check};
 use tiles::Halves;
 
-/// The file's name in the output's folder.
-pub const COMPARE: &str = "compare.json";
-
 /// What to compare, and where to write the page.
 #[derive(Clone, Debug, Default)]
 pub struct CompareOptions {
@@ -67,8 +68,9 @@ pub struct CompareOptions {
     pub force: bool,
 }
 
-/// Compares the pictures of the dataset's scenes. Scenes with a photo from elsewhere are left out. A view that Blender has
-/// not rendered is reported as `missing`; fails where that is every view of the others.
+/// Compares the pictures of the dataset's scenes, and writes the outcomes to the dataset's `compare.json`. Scenes with a photo
+/// from elsewhere are left out. A view that Blender has not rendered is reported as `missing`; fails where that is every view
+/// of the others.
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
     let mut scenes = dataset.chosen_scenes(&options.scenes)?;
@@ -81,6 +83,8 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     }
     check_rendered(&dataset, &scenes)?;
     check_out(options)?;
+    // Whether the dataset can be written is found before hours of rendering, and not after.
+    drop(BuildFolder::of(&dataset.root).lease_of_verdict()?);
     let work = options.out.as_deref().map(WorkFolder::start).transpose()?;
     let mut previews = Vec::new();
     let mut file = CompareFile {
@@ -105,12 +109,34 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     }
     let agrees = file.checks().all(|(_, _, check)| check.state == State::Agrees);
     file.agrees = agrees;
+    if !file.scenes.is_empty() {
+        verdict(&file).add_beside(&dataset.root)?;
+    }
     if let Some(work) = work {
         json::write(&work.path().join(COMPARE), &file)?;
         mateval_image::store::write_whole(&work.path().join("index.html"), page::page(&file, &previews).as_bytes())?;
         work.finish()?;
     }
     Ok(file)
+}
+
+/// The outcomes by scene, as the dataset's `compare.json` holds them.
+fn verdict(file: &CompareFile) -> compare_file::CompareFile {
+    let mut scenes: BTreeMap<SceneId, CompareCounts> = BTreeMap::new();
+    for (scene, _, check) in file.checks() {
+        let counts = scenes.entry(scene.clone()).or_default();
+        match check.state {
+            State::Agrees => counts.agree += 1,
+            State::Differs | State::Missing | State::Unreadable => counts.differ += 1,
+            State::TooNoisy | State::Undecided => counts.too_noisy += 1,
+        }
+    }
+    compare_file::CompareFile {
+        format: VERDICT_FORMAT.to_owned(),
+        tool: file.tool.clone(),
+        manifest_sha256: file.dataset.manifest_sha256.clone(),
+        scenes,
+    }
 }
 
 /// The renderer whose pictures are compared with the built-in tracer's.

@@ -64,7 +64,7 @@ fn dataset(scenes: Vec<SceneFile>) -> Dataset {
             version: "1.0".to_owned(),
             tool: String::new(),
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
-            scored_renderer: None,
+            photo_renderer: None,
             licences: Vec::new(),
             geometry: None,
             manifest_sha256: String::new(),

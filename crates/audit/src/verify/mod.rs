@@ -1,12 +1,12 @@
 //! Checks a dataset against the rules of its format. Every fault is reported, none is fixed.
 
-mod companions;
 mod geometry;
 mod photo;
 mod pictures;
 mod renders;
 mod scene_file;
 mod schema;
+mod scorer;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -59,8 +59,7 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, Audit
             progress(Report::part(&format!("scene {id}"), at, dataset.scenes.len()));
             let folder = SceneFolder::of(root, id);
             faults.prefix = format!("scenes/{id}/");
-            check_scene(&folder, dataset, id.as_str(), &mut faults);
-            companions::check(root, &folder, id, &mut faults);
+            check_scene(root, &folder, dataset, id.as_str(), &mut faults);
             faults.prefix.clear();
         }
         check_targets(root, dataset, &absent, &mut faults);
@@ -172,13 +171,14 @@ fn check_material_classes(folder: &SceneFolder, scene: &SceneFile, faults: &mut 
     }
 }
 
-fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
+fn check_scene(root: &Path, folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
     schema::check::<SceneFile>(folder.path(), "scene.json", faults);
     let Some(scene) = read_json::<SceneFile>("scene.json", &folder.scene_file(), faults) else { return };
     if scene.id.as_str() != id {
         faults.add("wrong_id", "scene.json", "/id", format!("'{}', but its folder is '{id}'", scene.id));
     }
     scene_file::check(&scene, faults);
+    scorer::check(root, folder, dataset, &scene, faults);
     let Some(meshes) = scene_meshes::check(folder, &scene, faults) else { return };
     let world = match folder.truth().is_dir() {
         true => {
@@ -197,7 +197,7 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
     };
     let Some(world) = faults.read("ground_truth/reference", world) else { return };
     pictures::check(folder, &scene, &meshes, &world, faults);
-    match (&dataset.scored_renderer, &scene.photo) {
+    match (&dataset.photo_renderer, &scene.photo) {
         (_, Some(photo)) => photo::check(folder, &scene, photo, faults),
         (Some(renderer), None) => renders::check(folder, &scene, renderer, faults),
         (None, None) => {}

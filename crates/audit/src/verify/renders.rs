@@ -1,4 +1,4 @@
-//! Checks the scored renders: that every view has them, at its size, and that the input view shows one of them.
+//! Checks the photo renderer's pictures: that every view has them, at its size, and that the input view shows one of them.
 
 use mateval_image::{LinearRgb, exr_io};
 use mateval_scene::RendererId;

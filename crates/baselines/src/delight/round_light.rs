@@ -42,13 +42,8 @@ pub(super) fn fitted_light(room: &PartRoom, halves: &LightHalves) -> RoundLight 
 
 /// The mean of two halves of light that does not depend on base colour, without its noise.
 pub(super) fn filtered(room: &PartRoom, [a, b]: &[Picture<LinearRgb>; 2]) -> Picture<LinearRgb> {
-    let white = room.photo.map(|_| LinearRgb([1.0; 3]));
-    let surfaces = noise_filter::Surfaces {
-        base_color: &white,
-        instances: &room.parts,
-        normals: &room.normals,
-        valid: &room.valid,
-    };
+    let surfaces =
+        noise_filter::Surfaces { base_color: None, instances: &room.parts, normals: &room.normals, valid: &room.valid };
     filtered_mean([a, b], &surfaces)
 }
 

@@ -29,7 +29,7 @@ pub struct ExplainArgs {
     #[arg(long)]
     submission: PathBuf,
     /// Protocol whose scores are explained.
-    #[arg(long, default_value = "mateval-2")]
+    #[arg(long, default_value = "mateval-3")]
     protocol: String,
     /// Folder for explain.md and pictures of the ten worst instances.
     #[arg(long)]

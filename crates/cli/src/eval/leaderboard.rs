@@ -29,7 +29,7 @@ pub struct LeaderboardArgs {
     #[arg(long)]
     out: PathBuf,
     /// Protocol whose scores are ranked.
-    #[arg(long, default_value = "mateval-2")]
+    #[arg(long, default_value = "mateval-3")]
     protocol: String,
     /// Accept results that lack scenes, and rank each on the scenes that it covers; they are marked.
     #[arg(long)]

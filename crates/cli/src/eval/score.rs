@@ -33,7 +33,7 @@ pub struct ScoreArgs {
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
     /// Protocol to score under; may be given several times.
-    #[arg(long = "protocol", value_name = "PROTOCOL", default_values = ["mateval-2"])]
+    #[arg(long = "protocol", value_name = "PROTOCOL", default_values = ["mateval-3"])]
     protocols: Vec<String>,
     /// Number of scenes that are scored at once. More take more memory and leave fewer threads idle.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
@@ -47,6 +47,10 @@ pub struct ScoreArgs {
     /// were scored apart.
     #[arg(long, requires = "cache")]
     only_cached: bool,
+    /// Folder for the pictures from which the numbers are computed, as float EXR, for whoever computes them again with
+    /// other tools; with several submissions a folder of it for each, 0 first.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "only_cached")]
+    pictures: Option<PathBuf>,
     /// Replace result files that already exist.
     #[arg(long)]
     force: bool,
@@ -56,7 +60,9 @@ pub struct ScoreArgs {
 pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     let protocols = args.protocols.iter().map(|name| Protocol::named(name)).collect::<Result<Vec<_>, _>>()?;
     let outs = args.result_paths();
-    for (place, path) in [("--out", Some(&args.out)), ("--cache", args.cache.as_ref())] {
+    for (place, path) in
+        [("--out", Some(&args.out)), ("--cache", args.cache.as_ref()), ("--pictures", args.pictures.as_ref())]
+    {
         if let Some(path) = path.filter(|path| is_inside(path, &args.dataset)) {
             bail!(
                 "'{}' would lie in the dataset, whose manifest does not list it; choose another {place}",
@@ -73,7 +79,6 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
         // A folder that cannot be made is found before anything is scored.
         std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
     }
-    let companions = weights::cache_folder().join("companions");
     let plan = ScorePlan {
         dataset: &dataset,
         submissions: opened.iter().map(Opened::root).collect(),
@@ -84,11 +89,11 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
         jobs: usize::from(args.jobs),
         cache: Some(&cache),
         only_cached: args.only_cached,
-        companion_cache: Some(&companions),
+        pictures: args.pictures.as_deref(),
     };
     let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
     for (result, out) in results.iter().zip(&outs) {
-        json::write(out, result)?;
+        json::write_lines(out, result)?;
         say_findings(&result.method, &result.findings, &out.display().to_string());
         print(&format!("{}\n", out.display()))?;
     }

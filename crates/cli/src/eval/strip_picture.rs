@@ -1,7 +1,7 @@
 //! What the pictures of `eval pictures` and `eval leaderboard` show: `--picture` and `--samples`.
 
 use clap::builder::PossibleValue;
-use mateval_eval::light_rules::Track;
+use mateval_eval::light::rules::Track;
 use mateval_eval::result_key::PictureKind;
 use mateval_report::strips::Shown;
 use mateval_scene::open::Dataset;
@@ -48,7 +48,7 @@ impl StripArgs {
 
     /// As [`Self::shown`], but by default also of the light of a dataset that has renders to compare with.
     pub fn shown_in_leaderboard(&self, dataset: &Dataset) -> Vec<Shown> {
-        match dataset.file.scored_renderer {
+        match dataset.file.photo_renderer {
             Some(_) => self.shown_or(&[StripPicture::Albedo, StripPicture::RgbTrue]),
             None => self.shown(),
         }

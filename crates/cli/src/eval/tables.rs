@@ -18,7 +18,7 @@ pub struct TablesArgs {
     #[arg(long, value_name = "RESULT.json")]
     ceiling: Option<PathBuf>,
     /// Protocol whose scores are shown.
-    #[arg(long, default_value = "mateval-2")]
+    #[arg(long, default_value = "mateval-3")]
     protocol: String,
     /// Format of the tables.
     #[arg(long, value_enum, default_value = "markdown")]

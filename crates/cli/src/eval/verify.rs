@@ -48,14 +48,12 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
     args.out.iter().try_for_each(|out| check_output_file(out, "--out", "verification", args.force))?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let opened = archive::open(&args.submission, &std::env::temp_dir())?;
-    let companions = weights::cache_folder().join("companions");
     let plan = VerifyPlan {
         result: &args.result,
         submission: opened.root(),
         dataset: &dataset,
         lpips: weights::load(Net::Alex),
         tool: TOOL.to_owned(),
-        companion_cache: Some(&companions),
         jobs: usize::from(args.jobs),
     };
     let found = with_progress(|progress| verify(plan, progress)).context("cannot verify")?;

@@ -25,8 +25,8 @@ pub fn run(args: &FinishArgs) -> anyhow::Result<Outcome> {
         mateval_prep::finish::finish(&args.dataset, &args.without, TOOL, progress)
     };
     let dataset = with_progress(finish).context("cannot finish the dataset")?;
-    let scored = dataset.scored_renderer.map_or("without scored renders".to_owned(), |id| format!("scored by {id}"));
-    print(&format!("{}: {}, {scored}\n", args.dataset.display(), counted(dataset.scenes.len(), "scene")))?;
+    let photos = dataset.photo_renderer.map_or("without photos".to_owned(), |id| format!("photos by {id}"));
+    print(&format!("{}: {}, {photos}\n", args.dataset.display(), counted(dataset.scenes.len(), "scene")))?;
     Ok(Outcome::Good)
 }
 

@@ -51,7 +51,7 @@ struct ReportArgs {
     #[arg(long, value_name = "RESULT.json", requires = "report")]
     floor: Option<PathBuf>,
     /// For the report: the protocol whose scores are shown.
-    #[arg(long, default_value = "mateval-2", requires = "report")]
+    #[arg(long, default_value = "mateval-3", requires = "report")]
     protocol: String,
     /// For the report: the day of publication, as in 2026-11-24.
     #[arg(long, requires = "report")]

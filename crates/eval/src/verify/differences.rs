@@ -7,16 +7,15 @@ use crate::result_key::ResultKey;
 
 /// Two values at one place that are not the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Difference {
-    /// A JSON pointer.
-    pub(super) place: String,
-    pub(super) said: String,
-    pub(super) found: String,
+pub(crate) struct Difference {
+    pub(crate) place: String,
+    pub(crate) said: String,
+    pub(crate) found: String,
 }
 
 /// All differences, in the order of places. Numbers must be the same to the last bit, or within their metric's
 /// [`Metric::tolerance`].
-pub(super) fn differences(said: &Value, found: &Value) -> Vec<Difference> {
+pub(crate) fn differences(said: &Value, found: &Value) -> Vec<Difference> {
     let mut differences = Vec::new();
     compare(said, found, &Place { pointer: String::new(), tolerance: 0.0 }, &mut differences);
     differences
@@ -37,13 +36,12 @@ impl Place {
 fn compare(said: &Value, found: &Value, place: &Place, differences: &mut Vec<Difference>) {
     match (said, found) {
         (Value::Object(a), Value::Object(b)) => {
-            let metric = a.get("metric").and_then(Value::as_str).and_then(|word| word.parse::<Metric>().ok());
             let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
             keys.sort();
             keys.dedup();
             for key in keys {
-                // A mean by its key, or the value beside its metric.
-                let metric = key.parse::<ResultKey>().map(|key| key.metric).ok().or(metric.filter(|_| key == "value"));
+                // A mean by its key, or a picture's value by its metric.
+                let metric = key.parse::<ResultKey>().map(|key| key.metric).or_else(|_| key.parse()).ok();
                 let pair = [a, b].map(|map| map.get(key).unwrap_or(&Value::Null));
                 compare(pair[0], pair[1], &place.below(key, metric.map_or(0.0, Metric::tolerance)), differences);
             }
@@ -101,15 +99,15 @@ mod tests {
         let value = |by: f64| {
             json!({
                 "summary": {"albedo.input.lpips_alex": 0.25 + by},
-                "pictures": [{"metric": "lpips_alex", "value": 0.25 + by, "count": 4}],
+                "pictures": [{"values": {"lpips_alex": 0.25 + by}}],
             })
         };
         assert!(places(&value(0.0), &value(9e-6)).is_empty());
-        let both = ["/pictures/0/value", "/summary/albedo.input.lpips_alex"];
+        let both = ["/pictures/0/values/lpips_alex", "/summary/albedo.input.lpips_alex"];
         assert_eq!(places(&value(0.0), &value(1.1e-5)), both);
         // The twin: other metrics have no tolerance.
-        let mse = |by: f64| json!({"pictures": [{"metric": "mse", "value": 0.25 + by}]});
-        assert_eq!(places(&mse(0.0), &mse(1e-9)), ["/pictures/0/value"]);
+        let mse = |by: f64| json!({"pictures": [{"values": {"mse": 0.25 + by}}]});
+        assert_eq!(places(&mse(0.0), &mse(1e-9)), ["/pictures/0/values/mse"]);
     }
 
     #[test]

@@ -3,23 +3,68 @@
 //! In: a result file, the submission and the dataset that it names. Out: a [`VerificationFile`]. Before anything is
 //! rendered, hashes and rules are compared: where they differ, numbers would too, and the findings state what has changed.
 
-mod differences;
-pub mod file;
-mod plan;
-mod sameness;
+pub(crate) mod differences;
+
+use std::path::Path;
 
 use mateval_scene::manifest::sha256_of_file;
+use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, Progress, Severity};
+use mateval_submission::hashed_submission::hashed_submission;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
-use crate::metric::Metric;
+use crate::metric::{LPIPS_NET, Metric};
 use crate::protocol::Protocol;
 use crate::result::{MissingNumbers, ResultFile};
 use crate::score::{LpipsWeights, ScorePlan, score};
 use differences::{Difference, differences};
-pub use file::{VERIFICATION_FORMAT, VerificationFile};
-pub use plan::VerifyPlan;
-use plan::file_name;
+
+/// The format name of this version of a verification.
+pub const VERIFICATION_FORMAT: &str = "mateval-verification/1";
+
+/// Whether a result states what its submission scores.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VerificationFile {
+    /// Always `mateval-verification/1`.
+    pub format: String,
+    /// Program and version, as in `mateval 0.1.0`.
+    pub tool: String,
+    /// SHA-256 of the result file, hex.
+    pub result_sha256: String,
+    /// The submission that the result names.
+    pub submission_sha256: String,
+    /// The dataset that the result names.
+    pub dataset_manifest_sha256: String,
+    /// Whether every number was reproduced: exactly, LPIPS to 1e-5.
+    pub confirmed: bool,
+    /// How many values of the result differ; 0 where none were computed again because hashes or rules differ.
+    pub differences: usize,
+    /// What differs: hashes and rules, or the first twenty values. Empty where `confirmed`.
+    pub findings: Vec<Finding>,
+}
+
+/// What to verify.
+pub struct VerifyPlan<'a> {
+    pub result: &'a Path,
+    /// The submission folder that it states.
+    pub submission: &'a Path,
+    /// The dataset that it was made on.
+    pub dataset: &'a Dataset,
+    /// The network of LPIPS; not needed where the result has no LPIPS.
+    pub lpips: LpipsWeights,
+    /// Name and version of this tool.
+    pub tool: String,
+    /// Number of scenes that are scored at once.
+    pub jobs: usize,
+}
+
+/// The last part of a path, for findings.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
 
 /// The most differences that are listed; all are counted.
 const MOST_LISTED: usize = 20;
@@ -35,13 +80,15 @@ pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<Verificati
         dataset_manifest_sha256: result.dataset.manifest_sha256.clone(),
         confirmed: false,
         differences: 0,
-        findings: sameness::findings(&plan, &result)?,
+        findings: obstacles(&plan, &result)?,
     };
     if !verification.findings.is_empty() {
         return Ok(verification);
     }
     let name = file_name(plan.result);
-    let again = scored_again(plan, &result, progress)?;
+    let mut again = scored_again(plan, &result, progress)?;
+    // The verdict lies outside the dataset's identity and may have been made or changed since.
+    again.tracer_check.clone_from(&result.tracer_check);
     let found = differences(&to_value(&result)?, &to_value(&again)?);
     let findings = found.iter().take(MOST_LISTED).map(|difference| finding(&name, difference)).collect();
     Ok(VerificationFile { confirmed: found.is_empty(), differences: found.len(), findings, ..verification })
@@ -60,7 +107,7 @@ fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_
         jobs: plan.jobs,
         cache: None,
         only_cached: false,
-        companion_cache: plan.companion_cache,
+        pictures: None,
     };
     Ok(score(&plan, progress)?.remove(0))
 }
@@ -85,5 +132,82 @@ fn finding(file: &str, difference: &Difference) -> Finding {
         place: difference.place.clone(),
         message: format!("the result states {}, computed again it is {}", difference.said, difference.found),
         action: "the result was changed, or made by another version; score it again".to_owned(),
+    }
+}
+
+/// Everything that has changed; numbers are computed again only if this is empty. Fails if the result holds LPIPS and its
+/// weights are missing.
+fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>, EvalError> {
+    let name = file_name(plan.result);
+    let finding = |code: &str, place: &str, message: String, action: &str| Finding {
+        severity: Severity::Error,
+        code: code.to_owned(),
+        file: name.clone(),
+        place: place.to_owned(),
+        message,
+        action: action.to_owned(),
+    };
+    let mut findings = Vec::new();
+    findings.extend(rules(result, &finding)?);
+    let (said, found) = (&result.dataset.manifest_sha256, &plan.dataset.file.manifest_sha256);
+    if said != found {
+        let message = format!("made on a dataset with manifest {said}; this one's is {found}");
+        let action = "verify it on the dataset that it was made on";
+        findings.push(finding("other_dataset", "/dataset/manifest_sha256", message, action));
+    } else {
+        let submission = hashed_submission(plan.submission, plan.dataset, &result.dataset.scenes)?;
+        if submission.sha256 != result.submission.sha256 {
+            let message = format!(
+                "made of a submission with hash {}; this one's is {} over submission.json and {} maps of the scored scenes",
+                result.submission.sha256, submission.sha256, submission.maps
+            );
+            let action = "it is another submission, or one of its files has changed; score it again";
+            findings.push(finding("other_submission", "/submission/sha256", message, action));
+        }
+    }
+    findings.extend(weights(plan, result, &finding)?);
+    findings.sort();
+    Ok(findings)
+}
+
+type MakeFinding<'a> = dyn Fn(&str, &str, String, &str) -> Finding + 'a;
+
+fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>, EvalError> {
+    let mut findings = Vec::new();
+    for (name, scores) in &result.protocols {
+        let place = format!("/protocols/{name}/protocol");
+        let Ok(known) = Protocol::named(name) else {
+            let message = format!("there is no protocol '{name}' in this version");
+            findings.push(finding("other_protocol", &place, message, "verify it with the version that made it"));
+            continue;
+        };
+        let values =
+            [&scores.protocol, &known].map(|protocol| serde_json::to_value(protocol).map_err(EvalError::Compare));
+        let [said, known] = values;
+        for difference in differences(&said?, &known?) {
+            let message = format!("the result states {}; protocol '{name}' has {}", difference.said, difference.found);
+            let place = format!("{place}{}", difference.place);
+            findings.push(finding("other_protocol", &place, message, "score it again by the published rules"));
+        }
+    }
+    Ok(findings)
+}
+
+fn weights(
+    plan: &VerifyPlan<'_>,
+    result: &ResultFile,
+    finding: &MakeFinding<'_>,
+) -> Result<Option<Finding>, EvalError> {
+    let Some(said) = result.lpips_weights.get(LPIPS_NET.name()).and_then(Option::as_ref) else { return Ok(None) };
+    match &plan.lpips {
+        LpipsWeights::Missing { reason, fix } => {
+            Err(EvalError::LpipsWeights { reason: reason.clone(), fix: fix.clone() })
+        }
+        LpipsWeights::Loaded(lpips) if lpips.sha256() == said => Ok(None),
+        LpipsWeights::Loaded(lpips) => {
+            let message = format!("made with weights {said}; those here are {}", lpips.sha256());
+            let action = "fetch the published weights: mateval fetch lpips";
+            Ok(Some(finding("other_weights", "/lpips_weights/alex", message, action)))
+        }
     }
 }

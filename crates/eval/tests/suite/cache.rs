@@ -71,7 +71,7 @@ fn poisoned(scenes: &[&str]) -> tempfile::TempDir {
     let cache = copied(scenes);
     for file in files(cache.path()) {
         let mut entry = read(&file);
-        entry["views"][0]["pictures"][0]["metrics"][0]["value"] = Value::from(POISON);
+        entry["pictures"][0]["values"]["mse"] = Value::from(POISON);
         std::fs::write(&file, entry.to_string()).unwrap();
     }
     cache
@@ -80,7 +80,10 @@ fn poisoned(scenes: &[&str]) -> tempfile::TempDir {
 /// Scenes whose entry was used.
 fn poisons(result: &ResultFile) -> Vec<String> {
     let pictures = result.protocols.values().flat_map(|protocol| &protocol.pictures);
-    pictures.filter(|picture| picture.value == Some(POISON)).map(|picture| picture.scene.to_string()).collect()
+    pictures
+        .filter(|picture| picture.values.values().any(|value| *value == POISON))
+        .map(|picture| picture.scene.to_string())
+        .collect()
 }
 
 #[test]

@@ -126,8 +126,8 @@ fn the_basis_that_made_the_photo_gives_its_radiances() {
 }
 
 /// The room that keeps its own lights: their planted radiances are recovered from a noisy photo, with other paths, to 2
-/// %. On a stage some lights contribute a hundredth of the photo's light, which noise hides: `benches/planted_fit.rs`
-/// measures how well those are recovered. The twin: a basis of one sample.
+/// %. On a stage some lights contribute a hundredth of the
+/// photo's light, which noise hides. The twin: a basis of one sample.
 #[test]
 fn a_noisy_photo_gives_the_radiances_of_a_rooms_own_lights() {
     let scene = dataset().scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap();

@@ -37,8 +37,9 @@ fn on_threads(threads: usize, plan: &ScorePlan<'_>) -> Vec<String> {
 #[test]
 fn on_any_number_of_threads() {
     // The others are scored on as many threads as there are cores.
-    let threads = if rayon::current_num_threads() == 1 { 2 } else { 1 };
-    assert!(on_threads(threads, &plan(&all(), &hasty(), &[])) == *TOGETHER, "{threads} threads");
+    for threads in [1, 2, 7] {
+        assert!(on_threads(threads, &plan(&all(), &hasty(), &[])) == *TOGETHER, "{threads} threads");
+    }
 }
 
 #[test]
@@ -61,9 +62,9 @@ fn with_any_other_submissions() {
     // The twins: methods differ, and so do numbers of samples.
     assert!(together[0] != together[1] && together[0] != together[2]);
     let mut fewer = hasty();
-    fewer.light.noise.most_samples = 2;
-    // Those of the truth itself do not depend on samples: its paths are the first companion's.
-    let pictures = |protocol| scored(&plan(&[dark], &protocol, &["room"]))[0].protocols["mateval-2"].pictures.clone();
+    (fewer.light.samples.least, fewer.light.samples.most) = (2, 2);
+    // Those of the truth itself do not depend on samples.
+    let pictures = |protocol| scored(&plan(&[dark], &protocol, &["room"]))[0].protocols["mateval-3"].pictures.clone();
     assert!(pictures(hasty()) != pictures(fewer));
 }
 

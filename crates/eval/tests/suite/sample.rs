@@ -27,19 +27,15 @@ pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) 
         jobs: 1,
         cache: None,
         only_cached: false,
-        companion_cache: None,
+        pictures: None,
     }
 }
 
-/// `mateval-2` with as few samples as its rules can say.
+/// `mateval-3` with as few samples as its rules can say.
 pub fn hasty() -> Protocol {
-    let mut protocol = Protocol::named("mateval-2").unwrap();
+    let mut protocol = Protocol::named("mateval-3").unwrap();
     protocol.light.fit.samples = 4;
-    protocol.light.noise.pilot_samples = 2;
-    protocol.light.noise.least_samples = 2;
-    protocol.light.noise.most_samples = 4;
-    protocol.light.noise.least_companion_samples = 8;
-    protocol.light.noise.most_companion_samples = 8;
+    (protocol.light.samples.least, protocol.light.samples.most) = (4, 4);
     protocol
 }
 

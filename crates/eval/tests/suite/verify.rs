@@ -31,12 +31,12 @@ static SCORED: LazyLock<Scored> = LazyLock::new(|| {
     let plan = ScorePlan {
         dataset: &dataset,
         submissions: vec![&submission],
-        protocols: vec![Protocol::named("mateval-2").unwrap()],
+        protocols: vec![Protocol::named("mateval-3").unwrap()],
         scenes: Vec::new(),
         lpips: missing(),
         tool: "test".to_owned(),
         only_cached: false,
-        companion_cache: None,
+        pictures: None,
         jobs: 1,
         cache: None,
     };
@@ -58,7 +58,6 @@ fn verified(result: &Value, submission: &Path) -> VerificationFile {
         dataset: &SCORED.dataset,
         lpips: missing(),
         tool: "test".to_owned(),
-        companion_cache: None,
         jobs: 1,
     };
     verify(plan, &|_| ()).unwrap()
@@ -83,7 +82,7 @@ fn a_clean_result_is_confirmed() {
 
 #[test]
 fn a_changed_digit_is_found() {
-    for place in ["/protocols/mateval-2/summary/albedo.input.mse", "/protocols/mateval-2/pictures/0/value"] {
+    for place in ["/protocols/mateval-3/instances/0/mse", "/protocols/mateval-3/texels/0/observed/area_m2"] {
         let mut changed = SCORED.result.clone();
         let value = changed.pointer_mut(place).unwrap();
         let number = value.as_f64().unwrap();
@@ -92,11 +91,30 @@ fn a_changed_digit_is_found() {
     }
 }
 
+/// A mean that does not follow from what is below it is refused before anything is computed, with its place.
+#[test]
+fn a_result_that_contradicts_itself_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("RESULT.json");
+    let base = "/protocols/mateval-3";
+    for place in ["summary/albedo.input.mse", "scenes/room/albedo.novel.ssim", "pictures/0/values/psnr"] {
+        let mut changed = SCORED.result.clone();
+        let value = changed.pointer_mut(&format!("{base}/{place}")).unwrap();
+        *value = (value.as_f64().unwrap() * 1.25).into();
+        json::write(&path, &changed).unwrap();
+        let error = ResultFile::read(&path).unwrap_err().to_string();
+        let shown = if place.starts_with("pictures") { "/scenes/living/albedo." } else { place };
+        assert!(error.contains(base) && error.contains(shown) && error.contains("changed by hand"), "{error}");
+    }
+    json::write(&path, &SCORED.result).unwrap();
+    ResultFile::read(&path).unwrap();
+}
+
 #[test]
 fn another_constant_is_found() {
     let mut changed = SCORED.result.clone();
-    changed["protocols"]["mateval-2"]["protocol"]["light"]["noise"]["target_db"] = 0.03.into();
-    let place = "/protocols/mateval-2/protocol/light/noise/target_db";
+    changed["protocols"]["mateval-3"]["protocol"]["light"]["relit"]["least_share"] = 0.03.into();
+    let place = "/protocols/mateval-3/protocol/light/relit/least_share";
     assert_eq!(refused(&changed, &SCORED.submission), one("other_protocol", place));
     changed["dataset"]["manifest_sha256"] = "0".into();
     let both = refused(&changed, &SCORED.submission);
@@ -107,7 +125,7 @@ fn another_constant_is_found() {
 fn a_result_of_another_version_is_named_as_such() {
     let mut older = SCORED.result.clone();
     older["format"] = "mateval-result/2".into();
-    older["protocols"]["mateval-2"]["start_radiance"] = 1.into();
+    older["protocols"]["mateval-3"]["start_radiance"] = 1.into();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("RESULT.json");
     json::write(&path, &older).unwrap();

@@ -11,7 +11,7 @@ def views(dataset: Path) -> Iterator[tuple[str, dict[str, Any], Path]]:
     for scene in description["scenes"]:
         folder = dataset / "scenes" / scene
         for view in json.loads((folder / "scene.json").read_text())["views"]:
-            renders = folder / "ground_truth/renders" / description["scored_renderer"]
+            renders = folder / "ground_truth/renders" / description["photo_renderer"]
             yield scene, view, renders / view["id"] / "rgb.png"
 
 

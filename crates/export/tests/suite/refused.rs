@@ -89,7 +89,7 @@ fn pictures_that_were_not_rendered() {
     let folder = copy();
     let path = folder.path().join("dataset.json");
     let mut file: DatasetFile = json::read(&path).unwrap();
-    file.scored_renderer = None;
+    file.photo_renderer = None;
     json::write(&path, &file).unwrap();
     for format in FORMATS {
         let found = exported(folder.path(), format).1;

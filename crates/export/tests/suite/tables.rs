@@ -22,7 +22,7 @@ fn rows_of_the_parquet_file_are_the_views() {
             let row = rows.next().unwrap().unwrap();
             let ids = [row.get_string(0).unwrap().as_str(), row.get_string(1).unwrap()];
             assert_eq!(ids, [scene.id.as_str(), view.id.as_str()]);
-            let renderer = sample_dataset::dataset().file.scored_renderer.as_ref().unwrap();
+            let renderer = sample_dataset::dataset().file.photo_renderer.as_ref().unwrap();
             let picture = sample_dataset::dataset().folder(&scene.id).render(renderer, &view.id).join("rgb.png");
             let bytes = row.get_group(2).unwrap().get_bytes(0).unwrap();
             assert!(bytes.data() == std::fs::read(picture).unwrap());

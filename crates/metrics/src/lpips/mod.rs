@@ -98,7 +98,7 @@ impl Lpips {
         })
     }
 
-    /// The mean over the mask (protocol `mateval-2`): the prediction's pixels outside the mask are replaced by the
+    /// The mean over the mask (protocol `mateval-3`): the prediction's pixels outside the mask are replaced by the
     /// reference's, each stage's map of distances is enlarged bilinearly to the picture's size, and the sum of the maps
     /// is averaged over the pixels of the mask. `None` where no pixel counts. The prediction is not read outside the
     /// mask, the reference is. Fails as [`Lpips::whole`] does.

@@ -94,7 +94,7 @@ fn without_noise(folder: &SceneFolder, view: &View, [a, b]: [&LightPictures; 2])
     let instances = map_of(view, &shown.join("instance.png"), png_io::read_ids)?;
     let normals = map_of(view, &shown.join("normal.exr"), exr_io::read_normal)?;
     let valid = instances.map(|instance| instance != 0);
-    let surfaces = Surfaces { base_color: &base_color, instances: &instances, normals: &normals, valid: &valid };
+    let surfaces = Surfaces { base_color: Some(&base_color), instances: &instances, normals: &normals, valid: &valid };
     Ok(LightPictures {
         rgb: filtered_mean([&a.rgb, &b.rgb], &surfaces),
         groups: a.groups.iter().zip(&b.groups).map(|(a, b)| filtered_mean([a, b], &surfaces)).collect(),

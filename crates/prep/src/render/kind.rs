@@ -15,7 +15,7 @@ pub enum RendererKind {
 }
 
 impl RendererKind {
-    /// Every renderer. A dataset is scored with the first one that has rendered all of its views.
+    /// Every renderer. The first one that has rendered all views of a dataset makes its input pictures.
     pub const ALL: [Self; 2] = [Self::Blender, Self::Builtin];
 
     /// The renderer's name: on the command line, in `render.json`, and of the folder that holds its pictures.

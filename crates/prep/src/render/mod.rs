@@ -1,6 +1,6 @@
 //! The RGB ground truth: every view of every scene without a photo, rendered in two independent halves.
 //!
-//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the scored renderer's name in `dataset.json`,
+//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the photo renderer's name in `dataset.json`,
 //! its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes, `finish` writes them).
 //!
 //! A new renderer is a file beside `builtin.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in
@@ -16,7 +16,7 @@ pub(crate) mod store;
 use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::dataset::{DatasetFile, SceneFile};
+use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile};
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder};
 use mateval_scene::open::chosen_ids;
 use mateval_scene::{Progress, SceneId, json};
@@ -85,7 +85,7 @@ impl Renderer {
     }
 }
 
-/// Renders the dataset in `root`. Where no scenes are chosen, it then names the scored renderer and writes a new manifest;
+/// Renders the dataset in `root`. Where no scenes are chosen, it then names the photo renderer and writes a new manifest;
 /// otherwise [`crate::finish`] does so, and several processes may render different scenes at once.
 ///
 /// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
@@ -96,7 +96,7 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
     if build_recipe.is_some() && !root.join(DATASET).is_file() {
         return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
     }
-    let dataset: DatasetFile = json::read(&root.join(DATASET))?;
+    let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
     if !root.join(MANIFEST).is_file() {
         return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
     }
@@ -123,8 +123,8 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
     }));
     if options.scenes.is_empty() {
         let dataset = finish_again(root, progress)?;
-        if dataset.scored_renderer.is_none() && !wanted.is_empty() {
-            let what = "some scenes have no pictures yet, so the dataset names no scored renderer";
+        if dataset.photo_renderer.is_none() && !wanted.is_empty() {
+            let what = "some scenes have no pictures yet, so the dataset names no photo renderer";
             report.remarks.push(what.to_owned());
         }
     }

@@ -68,13 +68,22 @@ class Result(Mapping[str, float]):
         return list(self._file["findings"])
 
     @property
+    def not_predicted(self) -> list[str]:
+        """Maps that the submission never contains, such as ``roughness``: they have no scores."""
+        return list(self._file["not_predicted"])
+
+    @property
     def missing(self) -> list[dict[str, Any]]:
         """Metrics that could not be computed: ``metric``, ``reason``, and the command to ``fix`` it."""
         return list(self._file["missing"])
 
     def to_records(self) -> list[dict[str, Any]]:
         """Every single value, as rows of a table: ``scene``, ``view``, ``picture``, ``region``, ``metric``, ``value``..."""
-        return list(self._protocol["pictures"])
+        return [
+            {**{key: stated for key, stated in picture.items() if key != "values"}, "metric": metric, "value": value}
+            for picture in self._protocol["pictures"]
+            for metric, value in picture["values"].items()
+        ]
 
     def __getitem__(self, key: str) -> float:
         try:
@@ -105,7 +114,7 @@ def score(
     dataset: _core.Dataset,
     *,
     scenes: Iterable[str] | None = None,
-    protocol: str = "mateval-2",
+    protocol: str = "mateval-3",
     cache: str | os.PathLike[str] | None = None,
 ) -> Result:
     """Scores a submission, a folder or an archive. Takes minutes, and needs the dataset's ground truth.

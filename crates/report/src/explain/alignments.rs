@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn scales_of_instances_remove_errors_that_a_scale_of_the_scene_cannot() {
-        let protocol = Protocol::named("mateval-2").unwrap();
+        let protocol = Protocol::named("mateval-3").unwrap();
         let scores = alignments(&SceneId::new("s").unwrap(), &protocol, &views()).unwrap();
         assert_eq!(scores.len(), 6 * 3);
         let mse = |by: AlignedBy, views: Views| {

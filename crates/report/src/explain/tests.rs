@@ -203,13 +203,12 @@ fn lights_worst_instances_by_share() {
         errors("b", Views::Input, 100, 0.02),
     ];
     let scores = ProtocolResult {
-        protocol: Protocol::named("mateval-2").unwrap(),
+        protocol: Protocol::named("mateval-3").unwrap(),
         fingerprint: String::new(),
         summary: BTreeMap::new(),
         scenes: BTreeMap::new(),
         summary_noise: BTreeMap::new(),
         noise: BTreeMap::new(),
-        companions: Default::default(),
         fits: BTreeMap::new(),
         pictures: Vec::new(),
         texels: Vec::new(),
@@ -239,7 +238,7 @@ fn text_and_page() {
         method: "m".to_owned(),
         submission_sha256: String::new(),
         dataset_manifest_sha256: String::new(),
-        protocol: "mateval-2".to_owned(),
+        protocol: "mateval-3".to_owned(),
         fingerprint: String::new(),
         scene: SceneId::new("s").unwrap(),
         views: vec![mateval_scene::ViewId::new("input").unwrap()],

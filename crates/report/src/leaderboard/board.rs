@@ -55,8 +55,8 @@ impl<'a> Board<'a> {
             version: text(|dataset| &dataset.version),
             manifest_sha256: text(|dataset| &dataset.manifest_sha256),
         };
-        let heads =
-            ranking.methods.iter().zip(&methods).map(|(ranked, method)| MethodHead::new(ranked, method, &ranking));
+        let heads = ranking.methods.iter().zip(&methods).zip(plan.results);
+        let heads = heads.map(|((ranked, method), result)| MethodHead::new(ranked, method, result, &ranking));
         Self {
             results: plan.results,
             ceiling: plan.ceiling,
@@ -104,7 +104,7 @@ impl<'a> Board<'a> {
 
     /// The column that the board is sorted by initially.
     pub(super) fn first(&self) -> Option<&Column> {
-        columns::first(&self.columns)
+        columns::first(&self.columns, self.scores.first().map_or(&[][..], |scores| &scores.protocol.headline))
     }
 
     /// The values of the method at place `at` for a scene, as tables show them; none where the scene has no such value.

@@ -15,10 +15,10 @@ use super::facts::{FACTS, Fact, FactColumn, facts};
 use super::heads::{Cell, MethodHead, rank_text, standing};
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
+use mateval_eval::result::TracerCheck;
 use mateval_eval::result_key::ResultKey;
 
 use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
-use crate::truth_noise::{self, Measured, close_pairs};
 
 /// The number of methods whose pictures the page opens with.
 const BEST: usize = 2;
@@ -33,9 +33,15 @@ struct BoardPage<'a> {
     first: &'a Column,
     rows: Vec<Row<'a>>,
     ceiling: Option<CeilingRow<'a>>,
-    /// One sentence a column, on methods that are closer to each other than the noise of the truth's pictures.
-    too_close: Vec<String>,
+    tracer: TracerNote,
     has_tables: bool,
+}
+
+/// Whether the scorer's tracer, which renders what light is compared with, shows the same rooms as Blender.
+#[derive(Serialize)]
+struct TracerNote {
+    is_good: bool,
+    text: String,
 }
 
 /// The pictures that the page opens with.
@@ -97,7 +103,7 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         rows,
         ceiling: ceiling_row(board, &columns),
         columns,
-        too_close: board.columns.iter().filter_map(|column| too_close(board, column)).collect(),
+        tracer: TracerNote::of(board),
         has_tables: site.path(super::downloads::TABLES).exists(),
     };
     site.page(&Page {
@@ -114,6 +120,23 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         }
     }
     Ok(())
+}
+
+impl TracerNote {
+    /// The check that speaks most against the tracer, as results may state different ones: it is not part of a dataset's
+    /// identity.
+    fn of(board: &Board<'_>) -> Self {
+        let checks = board.results.iter().chain(board.ceiling).filter_map(|result| result.tracer_check.as_ref());
+        match checks.max_by_key(|check| (check.informative.saturating_sub(check.agree), Reverse(check.informative))) {
+            None => {
+                Self { is_good: false, text: "The tracer was not compared with Blender on this dataset.".to_owned() }
+            }
+            Some(TracerCheck { informative, agree }) => Self {
+                is_good: agree == informative,
+                text: format!("Tracer and Blender agree in {agree} of {informative} informative checks."),
+            },
+        }
+    }
 }
 
 /// The row of the method at place `at`.
@@ -180,17 +203,6 @@ fn hidden_columns(board: &Board<'_>) -> String {
     let columns: Vec<HiddenColumn<'_>> = board.columns.iter().filter(|column| !column.is_shown).map(hidden).collect();
     // JSON is also valid JavaScript.
     format!("boardColumns({}, {});\n", serde_json::json!(order), serde_json::json!(columns))
-}
-
-/// A sentence on the methods that the noise of the truth cannot tell apart by a column; none without such.
-fn too_close(board: &Board<'_>, column: &Column) -> Option<String> {
-    let methods = board.heads.iter().zip(&board.scores).filter_map(|(head, scores)| {
-        let psnr = standing(board.ranking(), column.key, &head.id)?.value;
-        let truth_noise = truth_noise::of_dataset(scores, &column.key)?;
-        Some(Measured { method: &head.name, psnr, truth_noise })
-    });
-    let texts: Vec<String> = close_pairs(methods.collect()).iter().map(ToString::to_string).collect();
-    (!texts.is_empty()).then(|| format!("{} {}: {}.", column.title, column.metric_title, texts.join("; ")))
 }
 
 /// All pairs of methods by one number, row against column: the share of draws that the row's method wins, in percent,

@@ -6,7 +6,6 @@ use super::file::Ceiling;
 use crate::error::ReportError;
 use crate::mismatch::Mismatch;
 use crate::ranking::file::Ranking;
-use crate::truth_noise;
 
 /// The scores of the truth's `result`. Fails if it was not scored on the scenes and under the rules of the ranking.
 pub(super) fn of(result: &ResultFile, ranking: &Ranking) -> Result<Ceiling, ReportError> {
@@ -20,8 +19,7 @@ pub(super) fn of(result: &ResultFile, ranking: &Ranking) -> Result<Ceiling, Repo
         mismatches.push(Mismatch::Fingerprints { first, other });
     }
     ReportError::refuse(mismatches)?;
-    let values = scores.map(|scores| scores.summary.clone()).unwrap_or_default();
-    let noise = |key: &_| Some((*key, truth_noise::of_dataset(scores?, key)?));
-    let truth_noise_db = values.keys().filter_map(noise).collect();
-    Ok(Ceiling { method: result.method.clone(), values, truth_noise_db })
+    let (values, standard_errors_db) =
+        scores.map(|scores| (scores.summary.clone(), scores.summary_noise.clone())).unwrap_or_default();
+    Ok(Ceiling { method: result.method.clone(), values, standard_errors_db })
 }

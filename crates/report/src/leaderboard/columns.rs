@@ -3,16 +3,10 @@
 
 use mateval_eval::metric::{Better, Metric};
 use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces, Views};
+use mateval_scene::submission::Map;
 use serde::Serialize;
 
 use crate::ranking::file::Ranking;
-
-/// A board is sorted by the first of these that it has.
-const FIRST: [ResultKey; 3] = [
-    ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Psnr),
-    ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Mse),
-    ResultKey::whole(PictureKind::Albedo, Views::Input, Metric::Psnr),
-];
 
 /// A column of scores.
 #[derive(Clone, Serialize)]
@@ -22,6 +16,8 @@ pub(super) struct Column {
     pub(super) views: &'static str,
     pub(super) metric: &'static str,
     pub(super) region: &'static str,
+    /// The stem of the map that it is about; none for light.
+    pub(super) map: Option<&'static str>,
     /// As in `Albedo, novel views`.
     pub(super) title: String,
     /// As in `PSNR`.
@@ -44,6 +40,7 @@ impl Column {
             views: views.word(),
             metric: metric.word(),
             region: picture.surfaces.word(),
+            map: picture.kind.map().map(Map::stem),
             title: format!("{}, {}{region}", picture.kind.title(), views.title().to_lowercase()),
             metric_title: metric.style().title,
             better: metric.better(),
@@ -72,7 +69,7 @@ impl Column {
 
 /// Whether a column is shown initially.
 fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
-    matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue)
+    matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue | PictureKind::RgbFitted)
         && matches!(views, Views::Input | Views::Novel)
         && metric == Metric::Psnr
         && picture.surfaces == Surfaces::All
@@ -93,9 +90,9 @@ pub(super) fn shown(columns: &[Column]) -> Vec<&Column> {
     columns.iter().filter(|column| column.is_shown).collect()
 }
 
-/// The column that a board is sorted by initially.
-pub(super) fn first(columns: &[Column]) -> Option<&Column> {
-    let known = FIRST.iter().find_map(|key| columns.iter().find(|column| column.key == *key));
+/// The column that a board is sorted by initially: the first headline number of the protocol that the board has.
+pub(super) fn first<'a>(columns: &'a [Column], headline: &[ResultKey]) -> Option<&'a Column> {
+    let known = headline.iter().find_map(|key| columns.iter().find(|column| column.key == *key));
     known.or_else(|| columns.iter().find(|column| column.is_shown))
 }
 

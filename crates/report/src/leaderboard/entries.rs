@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_eval::result::{PictureValue, ResultFile};
+use mateval_eval::EvalError;
+use mateval_eval::result::{PictureValues, ResultFile};
 use mateval_scene::findings::shortened;
 use mateval_scene::{Finding, SceneError, Severity};
 use mateval_submission::method_name;
@@ -64,13 +65,16 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
 
 /// The result in the file, if it is one; what is wrong with it or with its method's name is added to the findings.
 fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<ResultFile>, ReportError> {
-    let read = ResultFile::read(path).map_err(ReportError::from);
+    let read = ResultFile::read(path).map_err(|error| match error {
+        EvalError::Dataset(error) => ReportError::Dataset(error),
+        other => ReportError::Eval(other),
+    });
     let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
     let bad_name = method_name::check(&result.method, Severity::Error, &path.display().to_string());
     findings.extend(bad_name.map(|finding| Finding { place: "/method".to_owned(), ..finding }));
     // Single pictures are most of a result's memory, and the site shows those of curves alone.
     let wide_views = &result.dataset.wide_views;
-    let is_kept = |value: &PictureValue| wide_views.contains_key(&value.scene) && wide_curves::is_shown(value);
+    let is_kept = |picture: &PictureValues| wide_views.contains_key(&picture.scene) && wide_curves::is_shown(picture);
     for scores in result.protocols.values_mut() {
         scores.pictures.retain(is_kept);
         scores.pictures.shrink_to_fit();
@@ -94,6 +98,9 @@ fn fitting<T>(
         Err(ReportError::Dataset(SceneError::Invalid { findings: faults, .. })) => {
             let fault = faults.into_iter().next().map(|fault| (fault.place, fault.message));
             fault.unwrap_or_default()
+        }
+        Err(ReportError::Eval(EvalError::Contradiction { place, said, found, .. })) => {
+            (place, format!("{said} where its own numbers give {found}"))
         }
         Err(other) => return Err(other),
     };
@@ -176,6 +183,20 @@ mod tests {
         assert_eq!(faults(&files), expected);
         let text = read(&files).unwrap_err().to_string();
         assert!(text.len() < 2000 && !text.contains('\u{202e}') && !text.contains('\0'), "{text}");
+    }
+
+    /// A mean that was changed by hand; the twin is the result as it was written.
+    #[test]
+    fn results_that_contradict_themselves_are_refused() {
+        let (folder, files) = folder(&[("a", "1")]);
+        assert_eq!(read(&files).unwrap().results.len(), 1);
+        let path = folder.path().join("0.json");
+        let mut result: ResultFile = json::read(&path).unwrap();
+        let summary = &mut result.protocols.get_mut("mateval-3").unwrap().summary;
+        summary.values_mut().for_each(|mean| *mean += 1.0);
+        json::write(&path, &result).unwrap();
+        let place = "/protocols/mateval-3/summary/albedo.input.mse";
+        assert_eq!(faults(&files), [fault("0.json", "unfit_file", place)]);
     }
 
     #[test]

@@ -55,8 +55,8 @@ pub struct Ceiling {
     pub method: String,
     /// Means over scenes.
     pub values: BTreeMap<ResultKey, f64>,
-    /// The standard error of such a mean due to the noise of the truth's pictures, in dB; light's PSNR alone has one.
-    pub truth_noise_db: BTreeMap<ResultKey, f64>,
+    /// The standard errors of means of PSNR due to render noise, in dB; light alone has them.
+    pub standard_errors_db: BTreeMap<ResultKey, f64>,
 }
 
 /// What a submission states about its method.

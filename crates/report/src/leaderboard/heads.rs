@@ -3,6 +3,7 @@
 use mateval_scene::submission::Cost;
 use serde::Serialize;
 
+use mateval_eval::result::ResultFile;
 use mateval_eval::result_key::ResultKey;
 
 use super::columns::Column;
@@ -31,10 +32,17 @@ pub(super) struct MethodHead {
     scenes: usize,
     /// The number of scenes that the submission leaves out, scored as grey.
     left_out: usize,
+    /// The stems of maps that the submission never contains.
+    not_predicted: Vec<String>,
 }
 
 impl MethodHead {
-    pub(super) fn new(ranked: &RankedMethod, method: &LeaderboardMethod, ranking: &Ranking) -> Self {
+    pub(super) fn new(
+        ranked: &RankedMethod,
+        method: &LeaderboardMethod,
+        result: &ResultFile,
+        ranking: &Ranking,
+    ) -> Self {
         let is_page = |url: &String| url.starts_with("https://") || url.starts_with("http://");
         let scenes = ranking.scenes.len();
         Self {
@@ -50,6 +58,7 @@ impl MethodHead {
             covered: scenes - ranked.not_scored.len() - ranked.left_out.len(),
             scenes,
             left_out: ranked.left_out.len(),
+            not_predicted: result.not_predicted.clone(),
         }
     }
 }

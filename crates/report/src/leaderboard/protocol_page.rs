@@ -16,7 +16,6 @@ use mateval_eval::protocol::Protocol;
 struct ProtocolPage<'a> {
     dataset: &'a LeaderboardDataset,
     weights: Option<&'a String>,
-    renderer: Option<&'a str>,
     protocol_sha256: String,
     rules: Vec<(String, String)>,
     ranking: &'a RankingRules,
@@ -33,7 +32,6 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
     let page = ProtocolPage {
         dataset: &board.file.dataset,
         weights: result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_ref),
-        renderer: result.dataset.scored_renderer.as_ref().map(mateval_scene::RendererId::as_str),
         protocol_sha256: scores.protocol.sha256(),
         rules: rules_of(&scores.protocol),
         ranking: rules,

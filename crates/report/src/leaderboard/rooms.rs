@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_eval::truth_material::TruthMaterial;
+use mateval_eval::light::true_maps::TruthMaterial;
 use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
 use mateval_scene::dataset::SceneFile;

@@ -1,6 +1,6 @@
 //! Tests of a small site of invented results; tests in a browser are in `tests/site`.
 
-use mateval_eval::result::ResultFile;
+use mateval_eval::result::{ResultFile, TracerCheck};
 use mateval_image::{Picture, png_io};
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::submission::Cost;
@@ -26,7 +26,7 @@ fn plan(results: &[ResultFile]) -> LeaderboardPlan<'_> {
         results,
         ceiling: None,
         verified: vec![Verified::Confirmed, Verified::No, Verified::Stale],
-        protocol: "mateval-2",
+        protocol: "mateval-3",
         partial: false,
         errata: None,
         pictures: None,
@@ -74,7 +74,7 @@ fn a_site_has_all_its_pages() {
     assert!(text("scenes/s01.html").contains("No pictures were given"));
     // Without a dataset there are no rooms, and the page says why.
     assert!(scene.contains("There is no 3D view") && !out.join("rooms").exists());
-    assert!(text("protocol.html").contains(&results[0].protocols["mateval-2"].fingerprint));
+    assert!(text("protocol.html").contains(&results[0].protocols["mateval-3"].fingerprint));
     assert!(text("errata.html").contains("None are known"));
     assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));
     assert!(out.join("pictures/good/s00/input/albedo-error.png").is_file() && !out.join("pictures/no id").exists());
@@ -100,6 +100,28 @@ fn the_ceiling_is_shown_and_not_ranked() {
     let plan = LeaderboardPlan { ceiling: Some(&other), ..plan(&results) };
     let error = write(&plan, &out, true, &quiet).unwrap_err().to_string();
     assert!(error.contains("'good' and 'gt' were scored on different scenes"), "{error}");
+}
+
+/// The check that speaks most against the tracer is stated, and its absence.
+#[test]
+fn a_board_states_whether_the_tracer_was_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = |checks: [Option<(usize, usize)>; 3]| {
+        let mut results = three();
+        for (result, check) in results.iter_mut().zip(checks) {
+            result.tracer_check = check.map(|(informative, agree)| TracerCheck { informative, agree });
+        }
+        let out = folder.path().join("site");
+        write(&plan(&results), &out, true, &quiet).unwrap();
+        let index = std::fs::read_to_string(out.join("index.html")).unwrap();
+        index.lines().find(|line| line.contains("racer")).unwrap().to_owned()
+    };
+    let good = "<p class=\"small\">Tracer and Blender agree in 65 of 65 informative checks.</p>";
+    let bad = "<p class=\"notice\">Tracer and Blender agree in 62 of 65 informative checks.</p>";
+    let absent = "<p class=\"notice\">The tracer was not compared with Blender on this dataset.</p>";
+    assert_eq!(line([None, Some((65, 65)), Some((65, 65))]), good);
+    assert_eq!(line([Some((65, 62)), Some((65, 65)), None]), bad);
+    assert_eq!(line([None; 3]), absent);
 }
 
 #[test]

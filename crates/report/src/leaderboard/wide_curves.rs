@@ -1,12 +1,12 @@
 //! Curves of scores in wide views against how wide they are.
 //!
-//! In: the single values of each method. Out: a chart for each kind of picture and metric, with a line for each method, whose
+//! In: the pictures' values of each method. Out: a chart for each kind of picture and metric, with a line for each method, whose
 //! points are means over all views of one class.
 
 use std::collections::BTreeMap;
 
 use mateval_eval::metric::Metric;
-use mateval_eval::result::PictureValue;
+use mateval_eval::result::PictureValues;
 use mateval_eval::result_key::{PictureName, Region, Surfaces};
 use mateval_scene::dataset::WideView;
 use mateval_scene::layout::INPUT;
@@ -17,7 +17,7 @@ use super::chart::{Chart, Values};
 /// What a method scored.
 pub(super) struct Method<'a> {
     pub(super) name: &'a str,
-    pub(super) pictures: &'a [PictureValue],
+    pub(super) pictures: &'a [PictureValues],
     pub(super) wide_views: &'a BTreeMap<SceneId, BTreeMap<ViewId, WideView>>,
 }
 
@@ -33,21 +33,22 @@ pub(super) enum Axis {
 /// Number of classes of shares.
 const SHARES: u32 = 5;
 
-/// Whether curves show a value, if its scene has wide views.
-pub(super) fn is_shown(value: &PictureValue) -> bool {
-    let is_of_a_class = value.view.is_wide() || value.view.as_str() == INPUT;
-    is_of_a_class && value.region == Region::Valid && value.picture.surfaces == Surfaces::All
+/// Whether curves show the values of a picture, if its scene has wide views.
+pub(super) fn is_shown(picture: &PictureValues) -> bool {
+    let is_of_a_class = picture.view.is_wide() || picture.view.as_str() == INPUT;
+    is_of_a_class && picture.region == Region::Valid && picture.picture.surfaces == Surfaces::All
 }
 
 /// The charts of every kind of picture and metric that wide views have values of.
 pub(super) fn charts(methods: &[Method<'_>], axis: Axis) -> Vec<Chart> {
     let mut kinds: Vec<(PictureName, Metric)> = Vec::new();
-    let wide =
-        methods.iter().flat_map(|method| method.pictures).filter(|value| value.view.is_wide() && is_shown(value));
-    for value in wide.filter(|value| value.value.is_some()) {
-        let kind = (value.picture, value.metric);
-        if !kinds.contains(&kind) {
-            kinds.push(kind);
+    let pictures = methods.iter().flat_map(|method| method.pictures);
+    for picture in pictures.filter(|picture| picture.view.is_wide() && is_shown(picture)) {
+        for metric in picture.values.keys() {
+            let kind = (picture.picture, *metric);
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
         }
     }
     kinds.into_iter().filter_map(|kind| chart(methods, axis, kind)).collect()
@@ -63,10 +64,10 @@ fn chart(methods: &[Method<'_>], axis: Axis, (picture, metric): (PictureName, Me
 /// The mean of a method's values in each class.
 fn means(method: &Method<'_>, axis: Axis, picture: PictureName, metric: Metric) -> BTreeMap<u32, f64> {
     let mut sums: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
-    let wanted =
-        method.pictures.iter().filter(|value| value.picture == picture && value.metric == metric && is_shown(value));
-    for value in wanted {
-        let (Some(class), Some(number)) = (class_of(method, axis, value), value.value) else { continue };
+    for of_view in method.pictures.iter().filter(|values| values.picture == picture && is_shown(values)) {
+        let (Some(class), Some(number)) = (class_of(method, axis, of_view), of_view.values.get(&metric)) else {
+            continue;
+        };
         let (sum, count) = sums.entry(class).or_default();
         *sum += number;
         *count += 1.0;
@@ -74,11 +75,11 @@ fn means(method: &Method<'_>, axis: Axis, picture: PictureName, metric: Metric) 
     sums.into_iter().map(|(class, (sum, count))| (class, sum / count)).collect()
 }
 
-fn class_of(method: &Method<'_>, axis: Axis, value: &PictureValue) -> Option<u32> {
-    let wide = method.wide_views.get(&value.scene)?;
-    match (axis, wide.get(&value.view)) {
+fn class_of(method: &Method<'_>, axis: Axis, picture: &PictureValues) -> Option<u32> {
+    let wide = method.wide_views.get(&picture.scene)?;
+    match (axis, wide.get(&picture.view)) {
         (Axis::Distance, Some(view)) => Some((100.0 * view.distance_m).round() as u32),
-        (Axis::Distance, None) => (value.view.as_str() == INPUT).then_some(0),
+        (Axis::Distance, None) => (picture.view.as_str() == INPUT).then_some(0),
         (Axis::UnseenShare, Some(view)) => {
             Some(((f64::from(SHARES) * view.unseen_share).floor() as u32).min(SHARES - 1))
         }
@@ -98,18 +99,18 @@ mod tests {
     use super::*;
     use mateval_eval::result_key::PictureKind;
 
-    fn value(view: &str, number: f64) -> PictureValue {
-        PictureValue {
+    fn value(view: &str, number: f64) -> PictureValues {
+        PictureValues {
             scene: SceneId::new("a").unwrap(),
             view: ViewId::new(view).unwrap(),
             picture: PictureName::whole(PictureKind::Albedo),
             lighting: None,
             region: Region::Valid,
-            metric: Metric::Psnr,
-            value: Some(number),
+            pixels: 1,
+            values: BTreeMap::from([(Metric::Psnr, number)]),
+            mse_error: None,
             exact: false,
-            noise: None,
-            count: 1,
+            lower_bound: false,
         }
     }
 

@@ -31,8 +31,7 @@ impl<'a> Entrant<'a> {
     fn basis(&self, scenes: &[&SceneId]) -> String {
         let weights = self.result.lpips_weights.get(&self.scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
         let dataset = &self.result.dataset;
-        let renderer = dataset.scored_renderer.as_ref();
-        self.scores.protocol.fingerprint(&dataset.manifest_sha256, scenes, renderer, weights)
+        self.scores.protocol.fingerprint(&dataset.manifest_sha256, scenes, weights)
     }
 }
 

@@ -1,16 +1,19 @@
 //! Tests of rankings on simulated leaderboards, whose true means are known.
 
 use mateval_scene::dataset_id::DatasetId;
-use mateval_scene::{Finding, InstanceId, Severity, splitmix64};
+use mateval_scene::{Finding, InstanceId, Severity, ViewId, splitmix64};
 
 use super::bootstrap::{duels, intervals};
 use super::clusters::Clusters;
 use super::file::{IntervalKind, RankRange, Standing};
 use super::*;
+use mateval_eval::means::means;
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::{InstanceTexelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId, TexelErrors};
-use mateval_eval::result_key::{PictureKind, Views};
+use mateval_eval::result::{
+    InstanceTexelErrors, PictureValues, ProtocolResult, RESULT_FORMAT, SubmissionId, TexelErrors,
+};
+use mateval_eval::result_key::{PictureKind, Region, Views};
 
 /// A sequence of random numbers, uniform and standard normal.
 struct Chance(u64, u64);
@@ -134,36 +137,33 @@ fn scene(number: usize) -> SceneId {
     SceneId::new(format!("s{number:02}")).unwrap()
 }
 
-fn summary(scenes: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>) -> BTreeMap<ResultKey, f64> {
-    let mut summary = BTreeMap::new();
-    for (key, value) in scenes.values().flatten() {
-        *summary.entry(*key).or_insert(0.0) += value / scenes.len() as f64;
-    }
-    summary
-}
-
 /// The result of a method with these PSNR, one for each scene, and one scene in each house.
 pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
-    let scenes: BTreeMap<_, _> = psnr
-        .iter()
-        .enumerate()
-        .map(|(at, psnr)| {
-            let values = [(PSNR, *psnr), (MSE, 10_f64.powf(-psnr / 10.0))];
-            (scene(at), values.into())
-        })
-        .collect();
-    let protocol = Protocol::named("mateval-2").unwrap();
+    let picture = |(at, psnr): (usize, &f64)| PictureValues {
+        scene: scene(at),
+        view: ViewId::new("input").unwrap(),
+        picture: PSNR.picture,
+        lighting: None,
+        region: Region::Valid,
+        pixels: 1,
+        values: BTreeMap::from([(Metric::Psnr, *psnr), (Metric::Mse, 10_f64.powf(-psnr / 10.0))]),
+        mse_error: None,
+        exact: false,
+        lower_bound: false,
+    };
+    let pictures: Vec<PictureValues> = psnr.iter().enumerate().map(picture).collect();
+    let (scenes, summary) = means(&pictures, &[]);
+    let protocol = Protocol::named("mateval-3").unwrap();
     let ids: Vec<SceneId> = scenes.keys().cloned().collect();
     let scores = ProtocolResult {
-        fingerprint: protocol.fingerprint("m", &ids.iter().collect::<Vec<_>>(), None, None),
+        fingerprint: protocol.fingerprint("m", &ids.iter().collect::<Vec<_>>(), None),
         protocol,
-        summary: summary(&scenes),
+        summary,
         scenes,
         summary_noise: BTreeMap::new(),
         noise: BTreeMap::new(),
-        companions: Default::default(),
         fits: BTreeMap::new(),
-        pictures: Vec::new(),
+        pictures,
         texels: Vec::new(),
         instances: Vec::new(),
     };
@@ -185,12 +185,15 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
             manifest_sha256: "m".to_owned(),
             total_scenes: ids.len(),
             wide_views: BTreeMap::new(),
+            sources: Default::default(),
             houses: ids.iter().map(|id| (id.clone(), format!("house of {id}"))).collect(),
             scenes: ids,
-            scored_renderer: None,
+            photo_renderer: None,
         },
         lpips_weights: BTreeMap::from([("alex".to_owned(), None)]),
-        protocols: BTreeMap::from([("mateval-2".to_owned(), scores)]),
+        protocols: BTreeMap::from([("mateval-3".to_owned(), scores)]),
+        not_predicted: Vec::new(),
+        tracer_check: None,
         missing: Vec::new(),
         findings: Vec::new(),
     }
@@ -209,7 +212,7 @@ fn standings<'a>(ranking: &'a Ranking, key: &ResultKey) -> &'a [Standing] {
 fn copies_share_a_rank() {
     let results =
         [result("Good", &scores(30.0, 0.1)), result("bad", &scores(20.0, 0.0)), result("good!", &scores(30.0, 0.1))];
-    let ranking = rank(&results, "mateval-2", false).unwrap();
+    let ranking = rank(&results, "mateval-3", false).unwrap();
     let ids: Vec<&str> = ranking.methods.iter().map(|method| method.id.as_str()).collect();
     assert_eq!(ids, ["good", "bad", "good-2"]);
     for key in &[PSNR, MSE] {
@@ -229,7 +232,7 @@ fn the_same_bytes_whatever_the_threads() {
     let results = [result("a", &scores(25.0, 0.3)), result("b", &scores(25.1, -0.2)), result("c", &scores(24.0, 0.5))];
     let text = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        mateval_scene::json::to_text(&pool.install(|| rank(&results, "mateval-2", false)).unwrap())
+        mateval_scene::json::to_text(&pool.install(|| rank(&results, "mateval-3", false)).unwrap())
     };
     assert_eq!(text(1), text(3));
 }
@@ -249,7 +252,7 @@ fn many_methods_need_more_draws() {
 fn few_houses_give_no_intervals() {
     let [four, five] = [4, 5].map(|scenes| {
         let cut = |method: &str, mean| result(method, &scores(mean, 0.1)[..scenes]);
-        rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-2", false).unwrap()
+        rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-3", false).unwrap()
     });
     let first = |ranking: &Ranking| standings(ranking, &PSNR)[0].clone();
     assert!(first(&four).interval.is_none() && first(&five).interval.is_some());
@@ -261,9 +264,9 @@ fn few_houses_give_no_intervals() {
 fn partial_results_are_accepted_only_on_request() {
     let part = result("part", &scores(40.0, 0.0)[..6]);
     let results = [result("whole", &scores(30.0, 0.0)), part.clone(), result("low", &scores(20.0, 0.0))];
-    let error = rank(&results, "mateval-2", false).unwrap_err().to_string();
+    let error = rank(&results, "mateval-3", false).unwrap_err().to_string();
     assert!(error.contains("'part' was scored on 6 of 12 scenes") && error.contains("--partial"), "{error}");
-    let ranking = rank(&results, "mateval-2", true).unwrap();
+    let ranking = rank(&results, "mateval-3", true).unwrap();
     let partial: Vec<bool> = ranking.methods.iter().map(|method| method.partial).collect();
     assert_eq!((partial, ranking.methods[1].not_scored.len()), (vec![false, true, false], 6));
     let standings = standings(&ranking, &PSNR);
@@ -271,7 +274,7 @@ fn partial_results_are_accepted_only_on_request() {
     let pairs: Vec<usize> = ranking.keys[&PSNR].pairs.iter().map(|pair| pair.scenes).collect();
     assert_eq!(pairs, [6, 12, 6]);
     // The intervals of complete results do not depend on the partial one.
-    let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-2", false).unwrap();
+    let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-3", false).unwrap();
     let interval = |ranking: &Ranking| ranking.keys[&PSNR].standings[0].interval;
     assert_eq!(interval(&ranking), interval(&alone));
 }
@@ -287,7 +290,7 @@ fn scenes_left_out_of_a_submission() {
         observed: TexelErrors::default(),
         unobserved: TexelErrors::default(),
     };
-    gaps.protocols.get_mut("mateval-2").unwrap().texels = (0..12).map(|at| texels(scene(at))).collect();
+    gaps.protocols.get_mut("mateval-3").unwrap().texels = (0..12).map(|at| texels(scene(at))).collect();
     let missing = |file: &str| Finding {
         severity: Severity::Warning,
         code: "missing_map".to_owned(),
@@ -299,7 +302,7 @@ fn scenes_left_out_of_a_submission() {
     gaps.findings = vec![missing("scenes/s03/sofa/base_color.png"), missing("scenes/s04/sofa/roughness.png")];
     let results = [gaps, result("whole", &scores(31.0, 0.0))];
     for (partial, scenes) in [(false, 12), (true, 11)] {
-        let ranking = rank(&results, "mateval-2", partial).unwrap();
+        let ranking = rank(&results, "mateval-3", partial).unwrap();
         assert_eq!(ranking.methods[0].left_out, [scene(3)]);
         assert_eq!(standings(&ranking, &PSNR)[0].scenes, scenes);
         assert_eq!(ranking.methods[0].partial, partial);
@@ -312,30 +315,30 @@ fn results_that_cannot_be_ranked_together() {
     let refused = |change: fn(&mut ResultFile)| {
         let mut other = result("other", &scores(20.0, 0.0));
         change(&mut other);
-        rank(&[good.clone(), other], "mateval-2", true).unwrap_err().to_string()
+        rank(&[good.clone(), other], "mateval-3", true).unwrap_err().to_string()
     };
     let scored_anew = |result: &mut ResultFile, manifest: &str| {
         result.dataset.manifest_sha256 = manifest.to_owned();
         let ids: Vec<&SceneId> = result.dataset.scenes.iter().collect();
-        let scores = result.protocols.get_mut("mateval-2").unwrap();
-        scores.fingerprint = scores.protocol.fingerprint(manifest, &ids, None, None);
+        let scores = result.protocols.get_mut("mateval-3").unwrap();
+        scores.fingerprint = scores.protocol.fingerprint(manifest, &ids, None);
     };
     let mut other = result("other", &scores(20.0, 0.0));
     scored_anew(&mut other, "another");
-    let error = rank(&[good.clone(), other], "mateval-2", true).unwrap_err().to_string();
+    let error = rank(&[good.clone(), other], "mateval-3", true).unwrap_err().to_string();
     assert!(error.contains("'good' and 'other' have different fingerprints"), "{error}");
     let error = refused(|other| other.dataset.manifest_sha256 = "another".to_owned());
     assert!(error.contains("it was changed"), "{error}");
     let error = refused(|other| other.dataset.houses.clear());
     assert!(error.contains("the house of scene 's00'"), "{error}");
     let mut other = result("other", &scores(20.0, 0.0));
-    let scenes = &mut other.protocols.get_mut("mateval-2").unwrap().scenes;
+    let scenes = &mut other.protocols.get_mut("mateval-3").unwrap().scenes;
     scenes.get_mut(&scene(3)).unwrap().insert(PSNR, 1e300);
-    let error = rank(&[good.clone(), other], "mateval-2", false).unwrap_err().to_string();
+    let error = rank(&[good.clone(), other], "mateval-3", false).unwrap_err().to_string();
     assert!(error.contains("1e300 for 'albedo.input.psnr', which is not a possible score"), "{error}");
     let error = refused(|other| other.dataset.houses.values_mut().for_each(|house| house.push('2')));
     assert!(error.contains("assign scene 's00' to different houses"), "{error}");
     let error = refused(|other| other.protocols.clear());
-    assert!(error.contains("score it with --protocol mateval-2"), "{error}");
-    assert!(rank(&[], "mateval-2", false).is_err());
+    assert!(error.contains("score it with --protocol mateval-3"), "{error}");
+    assert!(rank(&[], "mateval-3", false).is_err());
 }

@@ -32,12 +32,7 @@ pub(super) fn text(table: &Table<'_>) -> String {
             let _ = writeln!(text, "{} \\\\", names.chain(cells).collect::<Vec<_>>().join(" & "));
         }
     }
-    text.push_str("\\bottomrule\n\\end{tabular}\n");
-    for sentence in &table.too_close {
-        let sentence = sentence.replace(char::is_control, " ");
-        let _ = writeln!(text, "% Closer than the noise of the truth's own pictures: {sentence}");
-    }
-    text.push('\n');
+    text.push_str("\\bottomrule\n\\end{tabular}\n\n");
     text
 }
 

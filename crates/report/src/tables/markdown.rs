@@ -21,13 +21,6 @@ pub(super) fn text(table: &Table<'_>) -> String {
         }
     }
     text.push('\n');
-    if !table.too_close.is_empty() {
-        let _ = writeln!(text, "Closer than the noise of the truth's own pictures:\n");
-        for sentence in &table.too_close {
-            let _ = writeln!(text, "- {}", plain_text(sentence));
-        }
-        text.push('\n');
-    }
     text
 }
 

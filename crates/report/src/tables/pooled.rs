@@ -31,7 +31,7 @@ pub(crate) fn pooled(instances: &[InstancePixelErrors], by: Grouping) -> BTreeMa
         let values = pooled.entry(category).or_default();
         let mut add = |quantity: Quantity, value: f64| {
             let key = CellKey { picture: PictureName::whole(kind), views, quantity };
-            values.insert(key, Value { value, standard_error: None, truth_noise: None });
+            values.insert(key, Value { value, standard_error: None });
         };
         let mse = sum / pixels as f64;
         add(Quantity::Pixels, pixels as f64);

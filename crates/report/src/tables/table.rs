@@ -5,8 +5,7 @@ use mateval_eval::metric::Better;
 use super::grouping::Grouping;
 use super::layouts::Layout;
 use super::rows::{Group, Row};
-use super::value::{CellKey, Quantity, Value};
-use crate::truth_noise::{Measured, close_pairs};
+use super::value::{CellKey, Value};
 
 /// A table without empty columns.
 pub(super) struct Table<'a> {
@@ -17,8 +16,6 @@ pub(super) struct Table<'a> {
     pub(super) blocks: Vec<(&'static str, usize)>,
     pub(super) columns: Vec<Column>,
     pub(super) groups: Vec<TableGroup<'a>>,
-    /// Which methods are closer to each other than the noise of the truth's pictures, one sentence a column.
-    pub(super) too_close: Vec<String>,
 }
 
 /// A column.
@@ -41,8 +38,8 @@ pub(super) struct TableGroup<'a> {
 pub(super) struct Cell {
     /// Scaled; none if it is missing.
     pub(super) value: Option<Value>,
-    /// Whether another method of the group has a value; if none has, there was nothing to measure.
-    pub(super) has_rivals: bool,
+    /// Whether a value could exist: another method of the group has one, and the submission contains the map.
+    pub(super) is_expected: bool,
     pub(super) digits: usize,
     pub(super) mark: Mark,
 }
@@ -77,21 +74,12 @@ impl<'a> Table<'a> {
         }
         let filled = groups.iter().filter_map(|group| TableGroup::fill(group, &columns)).collect();
         let group_head = match grouping {
-            Grouping::Dataset => None,
+            Grouping::Dataset => groups.iter().any(|group| !group.name.is_empty()).then_some("Source"),
             Grouping::Scene => Some("Scene"),
             Grouping::Category => Some("Category"),
             Grouping::SuperCategory => Some("Super-category"),
         };
-        let too_close = groups.iter().flat_map(|group| columns.iter().filter_map(|column| too_close(group, column)));
-        let too_close = too_close.collect();
-        (!columns.is_empty()).then_some(Self {
-            title: &layout.title,
-            group_head,
-            blocks,
-            columns,
-            groups: filled,
-            too_close,
-        })
+        (!columns.is_empty()).then_some(Self { title: &layout.title, group_head, blocks, columns, groups: filled })
     }
 }
 
@@ -103,14 +91,16 @@ impl<'a> TableGroup<'a> {
                 let scaled = |value: &Value| Value { value: value.value * column.key.quantity.style().scale, ..*value };
                 let of = |row: &Row| row.values.get(&column.key).map(scaled);
                 let values: Vec<_> = group.rows.iter().map(of).collect();
-                let mut cells = marked(&values, column.key.quantity);
-                cells.extend(group.ceiling.as_ref().map(|row| Cell {
+                let is_measured = values.iter().any(Option::is_some);
+                let cell = |(row, mark): (&Row, Mark)| Cell {
                     value: of(row),
-                    has_rivals: values.iter().any(Option::is_some),
+                    is_expected: is_measured && row.predicts(&column.key),
                     digits: column.key.quantity.style().digits,
-                    mark: Mark::None,
-                }));
-                cells
+                    mark,
+                };
+                let marks = marks(&values, column.key.quantity.better());
+                let rows = group.rows.iter().zip(marks);
+                rows.chain(group.ceiling.iter().map(|row| (row, Mark::None))).map(cell).collect()
             })
             .collect();
         if by_column.iter().flatten().all(|cell| cell.value.is_none()) {
@@ -124,20 +114,8 @@ impl<'a> TableGroup<'a> {
     }
 }
 
-/// A sentence on the methods of a group that the noise of the truth cannot tell apart by a column; none without such.
-fn too_close(group: &Group, column: &Column) -> Option<String> {
-    let methods = group.rows.iter().filter_map(|row| {
-        let value = row.values.get(&column.key)?;
-        Some(Measured { method: &row.method, psnr: value.value, truth_noise: value.truth_noise? })
-    });
-    let texts: Vec<String> = close_pairs(methods.collect()).iter().map(ToString::to_string).collect();
-    let scene = if group.name.is_empty() { String::new() } else { format!("{}, ", group.name) };
-    (!texts.is_empty()).then(|| format!("{scene}{}: {}", column.head(), texts.join("; ")))
-}
-
-/// Marks the best and the second best value. Equal values share a mark, and a single value has none.
-fn marked(values: &[Option<Value>], quantity: Quantity) -> Vec<Cell> {
-    let better = quantity.better();
+/// The marks of the best and the second best value. Equal values share a mark, and a single value has none.
+fn marks(values: &[Option<Value>], better: Option<Better>) -> Vec<Mark> {
     let mut distinct: Vec<f64> = values.iter().flatten().map(|value| value.value).collect();
     let is_contest = distinct.len() > 1;
     distinct.sort_by(f64::total_cmp);
@@ -150,13 +128,7 @@ fn marked(values: &[Option<Value>], quantity: Quantity) -> Vec<Cell> {
         Some(1) if better.is_some() => Mark::Second,
         _ => Mark::None,
     };
-    let cell = |value: &Option<Value>| Cell {
-        value: *value,
-        has_rivals: values.iter().flatten().count() > usize::from(value.is_some()),
-        digits: quantity.style().digits,
-        mark: value.map_or(Mark::None, |value| mark(value.value)),
-    };
-    values.iter().map(cell).collect()
+    values.iter().map(|value| value.map_or(Mark::None, |value| mark(value.value))).collect()
 }
 
 impl Column {
@@ -187,7 +159,7 @@ impl Cell {
 
     fn marked_value(&self, best: (&str, &str), second: (&str, &str)) -> String {
         let Some(Value { value, .. }) = self.value else {
-            return if self.has_rivals { "missing" } else { "-" }.to_owned();
+            return if self.is_expected { "missing" } else { "–" }.to_owned();
         };
         let digits = self.digits;
         let (before, after) = match self.mark {

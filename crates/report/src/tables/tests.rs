@@ -8,7 +8,7 @@ use mateval_scene::{InstanceId, SceneId};
 use super::*;
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::{InstancePixelErrors, NoiseState, ProtocolResult, PsnrNoise, RESULT_FORMAT, SubmissionId};
+use mateval_eval::result::{InstancePixelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId};
 use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 
 fn scene(name: &str) -> SceneId {
@@ -19,23 +19,13 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
     let summary: BTreeMap<ResultKey, f64> = summary.iter().map(|(key, value)| (key.parse().unwrap(), *value)).collect();
     let key = ResultKey::whole(PictureKind::RgbTrue, Views::Input, Metric::Psnr);
     let summary_noise = summary.keys().filter(|other| **other == key).map(|key| (*key, 0.016)).collect();
-    let noise = PsnrNoise {
-        standard_error_db: Some(0.25),
-        own_db: None,
-        companions_db: None,
-        truth_db: None,
-        fit_db: None,
-        samples: 16,
-        state: NoiseState::Certified,
-    };
     let scores = ProtocolResult {
         protocol: Protocol::named("paper").unwrap(),
         fingerprint: "f".to_owned(),
         scenes: BTreeMap::from([(scene("b"), summary.clone()), (scene("a"), BTreeMap::new())]),
-        noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key, noise)]))]),
+        noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key, 0.25)]))]),
         summary,
         summary_noise,
-        companions: Default::default(),
         fits: BTreeMap::new(),
         pictures: Vec::new(),
         texels: Vec::new(),
@@ -60,11 +50,14 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
             scenes: vec![scene("b"), scene("a")],
             total_scenes: 2,
             wide_views: BTreeMap::new(),
+            sources: Default::default(),
             houses: BTreeMap::new(),
-            scored_renderer: None,
+            photo_renderer: None,
         },
         lpips_weights: BTreeMap::new(),
         protocols: BTreeMap::from([("paper".to_owned(), scores)]),
+        not_predicted: Vec::new(),
+        tracer_check: None,
         missing: Vec::new(),
         findings: Vec::new(),
     }
@@ -131,16 +124,9 @@ c\"3      20.00   0.5000    50.000
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
 }
 
-/// `result` with this noise of the truth in its only scene that has scores.
-fn with_truth_noise(mut result: ResultFile, truth_db: f64) -> ResultFile {
-    let scores = result.protocols.get_mut("paper").unwrap();
-    scores.noise.values_mut().flat_map(BTreeMap::values_mut).for_each(|noise| noise.truth_db = Some(truth_db));
-    result
-}
-
 #[test]
-fn the_ceiling_comes_last_and_close_methods_are_told() {
-    let light = |method, psnr| with_truth_noise(result(method, &[("rgb_true.input.psnr", psnr)]), 0.25);
+fn the_ceiling_comes_last() {
+    let light = |method, psnr| result(method, &[("rgb_true.input.psnr", psnr)]);
     let results = [light("a", 20.2), light("b", 20.4), light("c", 20.0), light("d", 15.0)];
     let ceiling = light("gt", 45.0);
     let of = |format| tables(&results, Some(&ceiling), "paper", Grouping::Dataset, format).unwrap();
@@ -155,13 +141,8 @@ fn the_ceiling_comes_last_and_close_methods_are_told() {
 | d | 15.00 ± 0.02 |
 | gt (ceiling) | 45.00 ± 0.02 |
 
-Closer than the noise of the truth's own pictures:
-
-- Input view PSNR ↑: b and a are 0.200 dB apart, the truth's noise is 0.250 dB; a and c are 0.200 dB apart, the truth's noise is 0.250 dB
-
 ";
     assert_eq!(of(TableFormat::Markdown), expected);
-    assert!(of(TableFormat::Latex).ends_with("0.250 dB\n\n"), "{}", of(TableFormat::Latex));
     assert!(of(TableFormat::Csv).contains("\"gt (ceiling)\",45,0.016"), "{}", of(TableFormat::Csv));
     let mut other = ceiling;
     other.protocols.get_mut("paper").unwrap().fingerprint = "another".to_owned();
@@ -219,13 +200,20 @@ fn names_are_shown_as_they_are() {
     assert_eq!(row("a=1", TableFormat::Csv), "\"a=1\",-250");
 }
 
-/// The same names in the list of methods that are too close to each other.
+/// A map that a submission never contains is a dash and never the best; the twin lacks the value and is missing.
 #[test]
-fn names_in_sentences_are_escaped() {
-    let light = |method, psnr| with_truth_noise(result(method, &[("rgb_true.input.psnr", psnr)]), 0.25);
-    let results = [light("<b>", 20.2), light("[x](y)", 20.3)];
-    let markdown = shown(&results, Grouping::Dataset, TableFormat::Markdown);
-    assert!(markdown.contains("\\[x\\](y) and &lt;b&gt; are 0.100 dB apart"), "{markdown}");
+fn maps_that_are_not_predicted_are_no_missing_values() {
+    let light = ("rgb_true.novel.psnr", 20.0);
+    let last_row = |not_predicted: &str| {
+        let with = |name, mae| result(name, &[light, ("roughness.novel.mae", mae)]);
+        let without = ResultFile { not_predicted: vec![not_predicted.to_owned()], ..result("c", &[light]) };
+        let results = [with("a", 0.25), with("b", 0.5), without];
+        let markdown = shown(&results, Grouping::Dataset, TableFormat::Markdown);
+        let table = markdown.split("### Roughness").nth(1).unwrap();
+        assert!(table.contains("| a | **0.2500** |"), "{table}");
+        table.trim_end().lines().last().unwrap().to_owned()
+    };
+    assert_eq!([last_row("roughness"), last_row("metallic")], ["| c | – |", "| c | missing |"]);
 }
 
 /// Scene a has no values and is left out; scene b shows its own noise.
@@ -244,7 +232,7 @@ fn by_scene_in_the_datasets_order() {
 #[test]
 fn papers_tables_then_ours() {
     let keys = ["rgb_fitted.novel", "albedo_aligned.unobserved", "albedo.novel", "albedo.input", "roughness.input"];
-    let ours = ["texture_base_color.observed", "rgb_relit.input", "albedo_specular.input"];
+    let ours = ["texture_base_color.observed", "rgb_relit.input", "rgb_true_specular.input"];
     let values: Vec<(String, f64)> = keys.iter().chain(&ours).map(|key| (format!("{key}.mse"), 0.01)).collect();
     let values: Vec<(&str, f64)> = values.iter().map(|(key, value)| (key.as_str(), *value)).collect();
     let markdown = shown(&[result("a", &values)], Grouping::Dataset, TableFormat::Markdown);
@@ -257,7 +245,7 @@ fn papers_tables_then_ours() {
         "RGB, relit",
         "Roughness and metallic, input view",
         "Base colour, texture space",
-        "Albedo, input view, specular regions only",
+        "RGB, true light, specular regions only",
     ];
     assert_eq!(titles, expected);
     // A single value is not marked as the best.
@@ -322,7 +310,7 @@ fn missing_values_and_values_that_cannot_exist() {
         });
     });
     let markdown = shown(&both, Grouping::Category, TableFormat::Markdown);
-    assert!(markdown.contains("| other | m | missing | missing | missing | - | - | - |"), "{markdown}");
+    assert!(markdown.contains("| other | m | missing | missing | missing | – | – | – |"), "{markdown}");
 }
 
 #[test]
@@ -332,8 +320,8 @@ fn fingerprints_are_not_mixed() {
     let csv = |results: &[ResultFile], protocol| tables(results, None, protocol, Grouping::Dataset, TableFormat::Csv);
     let error = csv(&[result("a", &[]), other], "paper").unwrap_err();
     assert!(error.to_string().contains("different fingerprints"));
-    let error = csv(&[result("a", &[])], "mateval-2").unwrap_err();
-    assert!(error.to_string().contains("--protocol mateval-2"));
+    let error = csv(&[result("a", &[])], "mateval-3").unwrap_err();
+    assert!(error.to_string().contains("--protocol mateval-3"));
     let error = csv(&[result("a", &[])], "paper").unwrap_err();
     assert!(error.to_string().contains("no score under protocol 'paper'"));
 }

@@ -4,8 +4,6 @@ use std::fmt::Write as _;
 
 use super::table::{Column, Table};
 
-/// Width of a terminal, in columns.
-const WIDTH: usize = 80;
 /// Blanks between two columns.
 const GAP: &str = "  ";
 /// Bold on and off, as ANSI escape sequences.
@@ -61,13 +59,6 @@ pub(super) fn text(table: &Table<'_>, bold: bool) -> String {
             padded(&plain(row, at), &marked, wide, true)
         });
         push_line(&mut text, names.chain(values));
-    }
-    if !table.too_close.is_empty() {
-        text.push_str("\nCloser than the noise of the truth's own pictures:\n");
-        for sentence in &table.too_close {
-            let lines = wrapped(shown(sentence).split(' '), "- ", "  ", WIDTH);
-            lines.iter().for_each(|line| text.push_str(&format!("{line}\n")));
-        }
     }
     text
 }

@@ -55,6 +55,4 @@ pub(crate) struct Value {
     pub(crate) value: f64,
     /// The standard error that render noise causes, in the value's unit.
     pub(crate) standard_error: Option<f64>,
-    /// The standard error that the noise of the truth's pictures causes, in the value's unit.
-    pub(crate) truth_noise: Option<f64>,
 }

@@ -53,9 +53,10 @@ mod tests {
             manifest_sha256: String::new(),
             scenes: Vec::new(),
             total_scenes: 0,
+            sources: Default::default(),
             houses: Default::default(),
             wide_views: Default::default(),
-            scored_renderer: None,
+            photo_renderer: None,
         };
         let text = plain(&LintFile::new(String::new(), None, dataset, 1, folded(findings)));
         let expected = "error [nan] 'f0': a NaN; fix it (6 times; also 'f1', 'f2', 'f3', ...)\n\

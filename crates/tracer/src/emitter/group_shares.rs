@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::emitter::Emitters;
 
 /// The smallest share of a group, so that lamps that light little of a view are sampled too.
-const LEAST_SHARE: f64 = 0.02;
+pub const LEAST_SHARE: f64 = 0.02;
 /// Steps of the iteration that finds the factors on solid angles. Shares that no factors can meet are approached as far as
 /// [`LEAST_FACTOR`] allows.
 const STEPS: usize = 24;

@@ -10,7 +10,7 @@ mod area;
 mod distribution;
 mod environment;
 mod escape;
-mod group_shares;
+pub mod group_shares;
 mod radiance_map;
 
 use std::sync::Arc;
@@ -102,7 +102,7 @@ pub struct Emitted {
 }
 
 /// The probability mass that is spread evenly over all area emitters.
-const UNIFORM_SHARE: f32 = 0.2;
+pub const UNIFORM_SHARE: f32 = 0.2;
 /// The share of escaping rays at which an emitter at infinity counts half as much as where all escape.
 const FEW_ESCAPE: f32 = 0.005;
 /// The least weight of an emitter at infinity, so that it is sampled even where no probe reaches it.

@@ -44,7 +44,7 @@ pub(super) struct Window {
 /// Cells along each side of a tile.
 const TILE: usize = 16;
 /// The cosine of 75 degrees, beyond which a plane stretches a picture too far.
-const WIDEST: f64 = 0.258_819_045_102_520_74;
+pub(crate) const WIDEST: f64 = 0.258_819_045_102_520_74;
 /// Half the spacing of f32 at 1, the relative rounding of a ray's origin.
 const ORIGIN_ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 

@@ -125,21 +125,6 @@ fn two_roughnesses_share_paths_without_bias() {
     assert!(repaint(smooth).with_second(1, vec![None; scene.surfaces.len()]).is_err());
 }
 
-/// A factor of the base colours is the same as other colours.
-#[test]
-fn scaled_colors_are_other_colors() {
-    let scene = Arc::new(lit_room([[1.0; 3]; 4]));
-    let world = World::new(scene.clone()).unwrap();
-    let repaint = |colors: &[[f32; 3]]| {
-        Repaint::new(&world, &atlases(&scene), coats(&scene, colors, 0.5, 0.0), PrincipledFlavour::Blender).unwrap()
-    };
-    let scaled = repaint(&[COLORS[0]; 2]).with_scales(vec![1.0, 0.5]).unwrap();
-    let expected = repaint(&[COLORS[0], COLORS[0].map(|v| 0.5 * v)]);
-    assert_eq!(repainted(&world, &scaled, 0..2), repainted(&world, &expected, 0..2));
-    assert_ne!(repainted(&world, &scaled, 0..2)[1], repainted(&world, &expected, 0..2)[0], "the twin passes");
-    assert!(repaint(&COLORS).with_scales(vec![1.0]).is_err() && repaint(&COLORS).with_scales(vec![2.0; 3]).is_err());
-}
-
 /// Mixes are weighted sums of the basis.
 #[test]
 fn mixes_are_those_of_the_basis() {

@@ -42,7 +42,10 @@ function boardColumns(order, hidden) {
 function addColumn(column, at) {
   const place = (row, made) => row.insertBefore(Object.assign(made, { hidden: true }), row.cells[at]);
   place(table.tHead.rows[0], headCell(column));
-  for (const row of table.tBodies[0].rows) place(row, scoreCell(column.cells[row.dataset.id]));
+  for (const row of table.tBodies[0].rows) {
+    const isPredicted = !row.dataset.notPredicted.split(" ").includes(column.map);
+    place(row, scoreCell(column.cells[row.dataset.id], isPredicted));
+  }
   if (table.tFoot) place(table.tFoot.rows[0], cell("td", column.ceiling ?? "–"));
 }
 
@@ -60,8 +63,8 @@ function headCell({ key, picture, views, metric, region, better, title, metric_t
   return made;
 }
 
-function scoreCell(score) {
-  if (!score) return cell("td", "missing");
+function scoreCell(score, isPredicted) {
+  if (!score) return cell("td", isPredicted ? "missing" : "–");
   const made = cell("td", score.text);
   Object.assign(made.dataset, { v: score.value, r: score.rank });
   if (score.low !== null) Object.assign(made.dataset, { l: score.low, h: score.high });

@@ -1,0 +1,198 @@
+//! The mean squared error of a render, free of its noise, and the standard error of that.
+//!
+//! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the encoded
+//! difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is the squared
+//! true difference, whatever the noise. Each half consists of two quarters, whose difference u (of X) or v (of Y) has the
+//! half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the expectation of
+//! (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, without any assumption about the distribution of the noise beyond
+//! the independence of quarters. Where few large contributions make it small or negative, half of the first two terms
+//! counts, whose expectation is at least half of the variance.
+//!
+//! Pixels whose noise is correlated form a block ([`super::blocks`]): all sums are taken within blocks, and variances are
+//! added over them.
+
+use std::collections::BTreeMap;
+use std::f64::consts::LN_10;
+
+use mateval_image::{Mask, Picture};
+use mateval_metrics::{MetricError, Psnr};
+
+use super::difference::LightDifference;
+
+/// A Gaussian value exceeds its mean by more than this many standard deviations in 5 % of all cases.
+pub const ONE_SIDED_95: f64 = 1.645;
+
+/// An estimate of the mean squared error without noise, over some pixels of one view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightMse {
+    /// The estimate. It has no bias, so it may be negative where the true value is near 0.
+    pub mse: f64,
+    /// The estimate's noise by block id, ascending, for the blocks with pixels that count.
+    pub blocks: Vec<(u32, BlockNoise)>,
+    /// One sample of an error that all pixels of all views have in common, as that of lights which were fitted to noisy
+    /// pictures: its square is an estimate of its variance.
+    pub common: f64,
+}
+
+/// Sums over one block, each divided by the number of all values that count. Their unit is that of the MSE.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BlockNoise {
+    /// Σ Y u.
+    pub first_half: f64,
+    /// Σ X v.
+    pub second_half: f64,
+    /// Σ u v.
+    pub both_halves: f64,
+}
+
+impl BlockNoise {
+    fn add_scaled(&mut self, factor: f64, other: &Self) {
+        self.first_half += factor * other.first_half;
+        self.second_half += factor * other.second_half;
+        self.both_halves += factor * other.both_halves;
+    }
+}
+
+fn variance<'a>(blocks: impl Iterator<Item = &'a BlockNoise>, common: f64) -> f64 {
+    let (mut squares, mut products) = (0.0, 0.0);
+    for block in blocks {
+        squares += block.first_half.powi(2) + block.second_half.powi(2);
+        products += block.both_halves.powi(2);
+    }
+    (squares - products).max(squares / 2.0) + common.powi(2)
+}
+
+impl LightMse {
+    /// The error over the pixels of the mask and their channels; none where no pixel counts. `blocks` holds the block of each
+    /// pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
+    pub fn new(difference: &LightDifference, mask: &Mask, blocks: &Picture<u32>) -> Result<Option<Self>, MetricError> {
+        let LightDifference { halves: [first, second], noise: [u, v], .. } = difference;
+        let (mut sum, mut values) = (0.0, 0_usize);
+        let mut by_block: BTreeMap<u32, BlockNoise> = BTreeMap::new();
+        for (at, block) in blocks.pixels().iter().enumerate().filter(|&(at, _)| mask.pixels()[at]) {
+            let noise = by_block.entry(*block).or_default();
+            for c in 0..3 {
+                let [x, y, u, v] = [first, second, u, v].map(|picture| f64::from(picture.pixels()[at].0[c]));
+                sum += x * y;
+                noise.first_half += y * u;
+                noise.second_half += x * v;
+                noise.both_halves += u * v;
+                values += 1;
+            }
+        }
+        if values == 0 {
+            return Ok(None);
+        }
+        let share = 1.0 / values as f64;
+        let mse = sum * share;
+        if !mse.is_finite() {
+            return Err(MetricError::InvalidMse { mse });
+        }
+        let divided = |(block, noise): (u32, BlockNoise)| {
+            let mut divided = BlockNoise::default();
+            divided.add_scaled(share, &noise);
+            (block, divided)
+        };
+        Ok(Some(Self { mse, blocks: by_block.into_iter().map(divided).collect(), common: 0.0 }))
+    }
+
+    /// The standard error of `mse`.
+    pub fn standard_error(&self) -> f64 {
+        variance(self.blocks.iter().map(|(_, noise)| noise), self.common).sqrt()
+    }
+
+    /// The MSE that its PSNR is of: `mse`, or 1.645 standard errors where that is more.
+    pub fn bounded(&self) -> f64 {
+        self.mse.max(ONE_SIDED_95 * self.standard_error())
+    }
+
+    /// Whether the error may be noise alone, so that the PSNR is a lower bound.
+    pub fn is_lower_bound(&self) -> bool {
+        self.mse < self.bounded()
+    }
+
+    /// The PSNR of [`Self::bounded`]: it never rises with `mse`, nor jumps. It is exact where neither error nor noise is left.
+    pub fn psnr(&self) -> Result<Psnr, MetricError> {
+        Psnr::from_mse(self.bounded().max(0.0))
+    }
+}
+
+/// The standard error of the mean PSNR of several views, in dB; none without views.
+///
+/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE, with 1.645 standard errors in place of an MSE that is less; an exact
+/// view adds nothing. A block's effects on all views are summed before they are squared, so that correlation between views
+/// counts.
+pub fn mean_psnr_error(views: &[LightMse]) -> Option<f64> {
+    let (mut by_block, mut common): (BTreeMap<u32, BlockNoise>, f64) = Default::default();
+    for view in views.iter().filter(|view| view.bounded() > 0.0) {
+        let slope = -10.0 / LN_10 / view.bounded() / views.len() as f64;
+        common += slope * view.common;
+        for (block, noise) in &view.blocks {
+            by_block.entry(*block).or_default().add_scaled(slope, noise);
+        }
+    }
+    (!views.is_empty()).then(|| variance(by_block.values(), common).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_image::SrgbRgb;
+
+    use super::*;
+
+    fn greys(values: [f32; 2]) -> Picture<SrgbRgb> {
+        Picture::from_fn(2, 1, |x, _| SrgbRgb([values[x]; 3]))
+    }
+
+    fn error(mask: [bool; 2], blocks: [u32; 2]) -> Option<LightMse> {
+        let difference = LightDifference {
+            halves: [greys([0.5, 0.25]), greys([0.25, 0.25])],
+            noise: [greys([0.125, 0.0]), greys([0.25, 0.125])],
+            shown: greys([0.0; 2]),
+        };
+        let (mask, blocks) = (Picture::from_fn(2, 1, |x, _| mask[x]), Picture::from_fn(2, 1, |x, _| blocks[x]));
+        LightMse::new(&difference, &mask, &blocks).unwrap()
+    }
+
+    /// X Y = (0.125, 0.0625); Y u = (0.03125, 0), X v = (0.125, 0.03125), u v = (0.03125, 0). All sums are divided by 2.
+    #[test]
+    fn a_small_number_by_hand() {
+        let found = error([true, true], [7, 3]).unwrap();
+        assert_eq!(found.mse, 0.09375);
+        let first = BlockNoise { second_half: 0.015625, ..Default::default() };
+        let second = BlockNoise { first_half: 0.015625, second_half: 0.0625, both_halves: 0.015625 };
+        assert_eq!(found.blocks, [(3, first), (7, second)]);
+        let paths = 0.015625_f64.powi(2) + 0.0625_f64.powi(2);
+        assert!((found.standard_error() - paths.sqrt()).abs() < 1e-15);
+        // In one block, effects are added before they are squared.
+        let together = error([true, true], [1, 1]).unwrap();
+        let squares = 0.015625_f64.powi(2) + 0.078125_f64.powi(2);
+        assert!((together.standard_error() - (squares - 0.015625_f64.powi(2)).sqrt()).abs() < 1e-15);
+        assert_eq!(error([false, true], [7, 3]).unwrap().mse, 0.0625);
+        assert_eq!(error([false, false], [7, 3]), None);
+    }
+
+    /// Two equal views whose paths are the same have the error of one; of different blocks, 1/√2 of it. An error that all
+    /// have in common stays.
+    #[test]
+    fn views_that_share_paths_are_not_independent() {
+        let one = error([true, true], [1, 1]).unwrap();
+        let other = error([true, true], [2, 2]).unwrap();
+        let single = mean_psnr_error(std::slice::from_ref(&one)).unwrap();
+        let db = |views: &[LightMse]| mean_psnr_error(views).unwrap();
+        assert!((db(&[one.clone(), one.clone()]) / single - 1.0).abs() < 1e-12);
+        assert!((db(&[one.clone(), other]) / single - 0.5_f64.sqrt()).abs() < 1e-12);
+        let fitted = LightMse { mse: 0.1, blocks: vec![(1, BlockNoise::default())], common: 0.01 };
+        assert!((db(&[fitted.clone(), fitted]) - 10.0 / LN_10 * 0.1).abs() < 1e-12);
+        assert_eq!(mean_psnr_error(&[]), None);
+    }
+
+    #[test]
+    fn what_is_under_the_noise_is_a_lower_bound() {
+        let found = LightMse { mse: 1e-4, ..error([true, true], [1, 2]).unwrap() };
+        assert!(found.is_lower_bound() && found.psnr().unwrap().db < 20.0);
+        let exact = LightMse { mse: 0.0, blocks: vec![(1, BlockNoise::default())], common: 0.0 };
+        assert!(!exact.is_lower_bound() && exact.psnr().unwrap().exact);
+        assert_eq!(mean_psnr_error(&[exact]), Some(0.0));
+    }
+}

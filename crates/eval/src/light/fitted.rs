@@ -1,0 +1,211 @@
+//! The paper's light: radiances fitted to the photo, and renders compared with those of the photo's renderer.
+//!
+//! A method's light is unknown, so the paper fits the radiances of a light stage (3D-FRONT) or of the scene's own emitters
+//! (Bitterli) until the predicted materials look like the photo. Light is linear in emission: one set of paths shows the
+//! input view under each light alone. Two independent streams of paths give two fits, one for each half of the render, so that
+//! the noise of the fit adds no bias to the squared error; the difference of the errors under either fit shows its noise.
+//! The truth is another renderer's picture, so nothing travels along and nothing is exact.
+
+use mateval_image::{LinearRgb, Picture, SrgbRgb};
+use mateval_light::light_fit::{FitTarget, LightFit, fit_two_streams};
+use mateval_light::light_stage;
+use mateval_scene::{Camera, RendererId, SceneLights};
+use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, World};
+use rayon::prelude::*;
+
+use super::difference::{LightDifference, base_color_ratio, encoded, guided_mean};
+use super::lighting::{FittedRadiance, FittedRadiances};
+use super::lit_picture::{Each, EncodedReference, Guides, LitPicture, picture_of};
+use super::paths::{Paths, QUARTERS, batches};
+use super::rules::Track;
+use crate::error::EvalError;
+use crate::protocol::Protocol;
+use crate::scene_task::{BaseColors, SceneTask};
+use crate::truth::{ViewTruth, photo_of_renderer};
+
+/// Fits every submission's lights, renders it under them and compares it with the photo's renderer.
+pub(crate) fn score_fitted(
+    task: &SceneTask<'_>,
+    renderer: &RendererId,
+    truths: &[ViewTruth],
+    base_colors: &BaseColors,
+    protocol: &Protocol,
+    each: &mut Each<'_>,
+) -> Result<(), EvalError> {
+    let lit = LitRoom::new(task, protocol)?;
+    let photos: Vec<Picture<LinearRgb>> =
+        task.views.iter().map(|view| photo_of_renderer(task.folder, renderer, view)).collect::<Result<_, _>>()?;
+    let exposed_photos: Vec<Picture<LinearRgb>> = photos.iter().map(|photo| exposed(task, photo)).collect();
+    let references: Vec<EncodedReference> = exposed_photos.iter().map(EncodedReference::new).collect();
+    let paths = lit.paths(task, protocol);
+    let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
+    let samples = protocol.light.samples.each_half(task.pixels());
+    // A batch holds a render and four quarters of every prediction under two fits, or two bases of the input view.
+    let pictures = (5 * 2 * task.views.len()).max(4 * lit.names.len()) as u64;
+    let bytes = pictures * task.pixels() * size_of::<LinearRgb>() as u64;
+    for batch in batches(task.predictions, 0, bytes) {
+        let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
+        let repaint = paths.repaint(&predictions, None)?;
+        let fits = lit.fit(&paths, &repaint, task, truths, &photos)?;
+        let mixes: Vec<Vec<LightMix>> = fits.iter().map(|fit| fit.streams.to_vec()).collect();
+        // By prediction, fit and view: the quarters, exposed.
+        let mut quarters = vec![[0, 1].map(|_| vec![Vec::new(); task.views.len()]); batch.len()];
+        let mut not_finite = vec![0; batch.len()];
+        for stream in QUARTERS {
+            let renders = paths.trace(&repaint, Lighting::Mixed(&mixes), &cameras, (samples / 2).max(1), stream)?;
+            for (at, render) in renders.iter().enumerate() {
+                not_finite[at] += render.stats.not_finite;
+                for (fit, views) in quarters[at].iter_mut().enumerate() {
+                    for (view, quarters) in views.iter_mut().enumerate() {
+                        quarters.push(exposed(task, picture_of(render, view, fit)));
+                    }
+                }
+            }
+        }
+        for (at, (&index, fit)) in batch.iter().zip(fits).enumerate() {
+            let [first, second] = std::mem::take(&mut quarters[at]);
+            let pairs = base_colors.predicted[index].iter().zip(&base_colors.truth);
+            let ratios: Vec<_> = pairs.map(|(prediction, truth)| base_color_ratio(prediction, truth)).collect();
+            let guides = Guides { truths, ratios: &ratios, references: &exposed_photos };
+            // The first half under the first fit, the second under the second.
+            let both: Vec<[&Picture<LinearRgb>; 4]> =
+                first.iter().zip(&second).map(|(a, b)| [&a[0], &a[1], &b[2], &b[3]]).collect();
+            let under = |quarters: &[Vec<Picture<LinearRgb>>]| {
+                let views: Vec<_> = quarters.iter().map(|view| [0, 1, 2, 3].map(|at| &view[at])).collect();
+                plain_differences(&views, &guides)
+            };
+            let of_fits = Some([under(&first), under(&second)]);
+            let (track, not_finite, fit) = (Track::Fitted, not_finite[at], Some(fit.radiances));
+            let views = plain_differences(&both, &guides);
+            each(
+                index,
+                LitPicture { track, lighting: None, references: &references, views, of_fits, fit, not_finite },
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn exposed(task: &SceneTask<'_>, radiance: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    radiance.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * task.scene.exposure) as f32)))
+}
+
+/// The encoded difference of each half from the photo, without any correction.
+fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &Guides<'_>) -> Vec<LightDifference> {
+    let views = views.par_iter().enumerate();
+    views
+        .map(|(view, quarters)| {
+            let guide = guides.of(view);
+            let value = |picture: &Picture<LinearRgb>, at: usize, c: usize| f64::from(picture.pixels()[at].0[c]);
+            let (width, height) = (guide.reference.width(), guide.reference.height());
+            let each = |of: &dyn Fn(usize, usize) -> f64| {
+                Picture::from_fn(width, height, |x, y| SrgbRgb([0, 1, 2].map(|c| of(y * width + x, c) as f32)))
+            };
+            let mean = |half: usize, at: usize, c: usize| {
+                0.5 * (value(quarters[2 * half], at, c) + value(quarters[2 * half + 1], at, c))
+            };
+            let halves =
+                [0, 1].map(|half| each(&|at, c| encoded(mean(half, at, c)) - encoded(value(guide.reference, at, c))));
+            let noise = [0, 1].map(|half| {
+                each(&|at, c| {
+                    let [a, b] = [0, 1].map(|quarter| encoded(value(quarters[2 * half + quarter], at, c)));
+                    0.5 * (a - b)
+                })
+            });
+            let linear = [0, 1].map(|half| {
+                Picture::from_fn(width, height, |x, y| {
+                    LinearRgb([0, 1, 2].map(|c| mean(half, y * width + x, c) as f32))
+                })
+            });
+            LightDifference { halves, noise, shown: guided_mean(linear.each_ref(), &guide).to_srgb() }
+        })
+        .collect()
+}
+
+/// The lights whose radiances are fitted, in their world.
+struct LitRoom {
+    world: World,
+    names: Vec<String>,
+    is_stage: bool,
+}
+
+/// The weights of the lights that one prediction was fitted with.
+struct Fit {
+    /// Those of each stream.
+    streams: [LightMix; 2],
+    radiances: FittedRadiances,
+}
+
+impl LitRoom {
+    fn new(task: &SceneTask<'_>, protocol: &Protocol) -> Result<Self, EvalError> {
+        if task.scene.lights == SceneLights::Own {
+            let names = task.world.scene().lights.iter().map(|light| light.name.clone()).collect();
+            return Ok(Self { world: task.world.clone(), names, is_stage: false });
+        }
+        let stage = light_stage::scene_lights(&protocol.light.stage, task.scene, task.world);
+        let quads: Vec<StageLight> = stage.iter().map(|named| named.light.clone()).collect();
+        let names = stage.into_iter().map(|named| named.name).collect();
+        Ok(Self { world: task.world.on_stage(&quads)?, names, is_stage: true })
+    }
+
+    fn paths<'a>(&'a self, task: &'a SceneTask<'a>, protocol: &'a Protocol) -> Paths<'a> {
+        let pass = if self.is_stage { "stage" } else { "fitted" };
+        Paths {
+            scene: &task.scene.id,
+            world: &self.world,
+            atlases: task.atlases,
+            rules: &protocol.light,
+            pass: task.set.pass(pass),
+            progress: task.progress,
+        }
+    }
+
+    /// The fit of each prediction of `repaint`.
+    fn fit(
+        &self,
+        paths: &Paths<'_>,
+        repaint: &Repaint,
+        task: &SceneTask<'_>,
+        truths: &[ViewTruth],
+        photos: &[Picture<LinearRgb>],
+    ) -> Result<Vec<Fit>, EvalError> {
+        let input = task.input_view()?;
+        let place = task.views.iter().position(|view| view.id == input.id);
+        let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: task.scene.id.clone() })?;
+        let groups = LightGroups::apart(self.names.len());
+        let samples = (paths.rules.fit.samples / 2).max(1);
+        let bases = |stream: &str| -> Result<Vec<LightBasis>, EvalError> {
+            let cameras = std::slice::from_ref(&input.camera);
+            let renders = paths.trace(repaint, Lighting::Apart(&groups), cameras, samples, stream)?;
+            Ok(renders.into_iter().map(|mut render| render.views.remove(0).halves.remove(0).basis).collect())
+        };
+        let (first, second) = (bases("fit_a")?, bases("fit_b")?);
+        let target =
+            FitTarget { photo: &photos[place], mask: Some(&truths[place].valid), exposure: task.scene.exposure };
+        let fits = first.iter().zip(&second).map(|(first, second)| {
+            let fit = fit_two_streams(&paths.rules.fit, [first, second], &target)?;
+            let radiances = self.radiances(&fit.streams, &fit.weights(), &fit.spread());
+            Ok(Fit { streams: fit.streams.map(|stream| stream.weights), radiances })
+        });
+        fits.collect()
+    }
+
+    fn radiances(&self, streams: &[LightFit; 2], weights: &[[f64; 3]], spread: &[[f64; 3]]) -> FittedRadiances {
+        let lights = self.names.iter().zip(weights.iter().zip(spread));
+        let mean =
+            |of: &dyn Fn(&LightFit) -> f64| streams.iter().map(|fit| of(fit) / fit.squares.max(1) as f64 / 2.0).sum();
+        FittedRadiances {
+            stage: self.is_stage,
+            lights: lights
+                .map(|(light, (radiance, spread))| FittedRadiance {
+                    light: light.clone(),
+                    radiance: *radiance,
+                    spread: *spread,
+                })
+                .collect(),
+            mean_absolute_error: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].misfit)),
+            ridge: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].ridge)),
+            lower_bound: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].bound)),
+        }
+    }
+}

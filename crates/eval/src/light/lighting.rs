@@ -1,0 +1,297 @@
+//! Lightings: the scene's own emitters with weights that no method has seen, or radiances that were fitted.
+
+use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
+
+use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
+use mateval_tracer::LightMix;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+
+use super::rules::RelitRules;
+use crate::word_enum::UnknownWord;
+
+/// The name of a lighting of track `relit`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum LightingName {
+    /// `warm_cool`: alternately warm and cool groups.
+    WarmCool,
+    /// `alone_1`, `alone_2`, ...: one group alone, by its place among the brightest, from 1.
+    Alone(usize),
+}
+
+const WARM_COOL: &str = "warm_cool";
+const ALONE: &str = "alone_";
+
+impl fmt::Display for LightingName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::WarmCool => f.write_str(WARM_COOL),
+            Self::Alone(place) => write!(f, "{ALONE}{place}"),
+        }
+    }
+}
+
+impl FromStr for LightingName {
+    type Err = UnknownWord;
+
+    fn from_str(word: &str) -> Result<Self, UnknownWord> {
+        let alone = || word.strip_prefix(ALONE)?.parse().ok().map(Self::Alone);
+        let known = [Some(Self::WarmCool), alone()];
+        // Only the printed form is accepted: `alone_01` is not.
+        known.into_iter().flatten().find(|name| name.to_string() == word).ok_or_else(|| UnknownWord {
+            what: "lighting's name",
+            word: word.to_owned(),
+            expected: format!("{WARM_COOL}, {ALONE}1, {ALONE}2, ..."),
+        })
+    }
+}
+
+impl TryFrom<String> for LightingName {
+    type Error = UnknownWord;
+
+    fn try_from(word: String) -> Result<Self, UnknownWord> {
+        word.parse()
+    }
+}
+
+impl From<LightingName> for String {
+    fn from(name: LightingName) -> Self {
+        name.to_string()
+    }
+}
+
+impl JsonSchema for LightingName {
+    fn schema_name() -> Cow<'static, str> {
+        "LightingName".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "pattern": "^(warm_cool|alone_[1-9][0-9]*)$" })
+    }
+}
+
+/// A lighting of track `relit`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RelitLighting {
+    pub name: LightingName,
+    /// The weight of each light group and channel.
+    pub weights: LightMix,
+}
+
+/// The lightings of a scene, by the rule of [`RelitRules`].
+///
+/// `sums` holds [`light_of`] each light group, in the scene's order. A scene whose groups light nothing has no
+/// lightings.
+pub fn lightings(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<RelitLighting> {
+    let order = by_brightness(rules, sums);
+    if order.is_empty() {
+        return Vec::new();
+    }
+    let mut warm_cool = vec![[1.0; 3]; sums.len()];
+    for (place, &group) in order.iter().enumerate() {
+        warm_cool[group] = if place % 2 == 0 { rules.warm } else { rules.cool };
+    }
+    let mut lightings = vec![RelitLighting { name: LightingName::WarmCool, weights: warm_cool }];
+    if order.len() > 1 {
+        lightings.extend(order.iter().take(rules.alone_at_most).enumerate().map(|(place, &alone)| {
+            let weight = |group: usize| if group == alone { [1.0; 3] } else { [0.0; 3] };
+            RelitLighting { name: LightingName::Alone(place + 1), weights: (0..sums.len()).map(weight).collect() }
+        }));
+    }
+    lightings.iter_mut().for_each(|lighting| expose(&mut lighting.weights, sums));
+    lightings
+}
+
+/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its squared
+/// share of their luminance. With light samples divided in these proportions, the sum of the pictures' variances is least if
+/// the variance of a group's light follows the square of the light (Cochran, "Sampling techniques", section 5.5).
+pub(crate) fn group_shares(mixes: &[LightMix], sums: &[[f64; 3]]) -> Vec<f64> {
+    let mut squares = vec![0.0; sums.len()];
+    for mix in mixes {
+        let of_groups: Vec<f64> = sums.iter().zip(mix).map(|(sum, weight)| weighted_luminance(sum, weight)).collect();
+        let total: f64 = of_groups.iter().sum();
+        if total > 0.0 {
+            squares.iter_mut().zip(of_groups).for_each(|(square, light)| *square += (light / total).powi(2));
+        }
+    }
+    squares.into_iter().map(f64::sqrt).collect()
+}
+
+/// Scales the weights so that the input view is as bright as under the scene's own lights.
+fn expose(weights: &mut LightMix, sums: &[[f64; 3]]) {
+    let own: f64 = sums.iter().map(|sum| luminance(*sum)).sum();
+    let pairs = sums.iter().zip(weights.iter());
+    let lit: f64 = pairs.map(|(sum, weight)| weighted_luminance(sum, weight)).sum();
+    let scale = own / lit;
+    weights.iter_mut().flatten().for_each(|weight| *weight *= scale);
+}
+
+/// Groups that bring their share of the light, brightest first; equally bright groups keep their order.
+fn by_brightness(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<usize> {
+    let bright: Vec<f64> = sums.iter().map(|sum| luminance(*sum)).collect();
+    let least = rules.least_share * bright.iter().sum::<f64>();
+    let mut order: Vec<usize> = (0..bright.len()).filter(|&at| bright[at] > 0.0 && bright[at] >= least).collect();
+    order.sort_by(|&a, &b| bright[b].total_cmp(&bright[a]).then(a.cmp(&b)));
+    order
+}
+
+/// The linear light of a light group in R's input view, summed over its valid pixels, by channel.
+pub fn light_of(picture: &Picture<LinearRgb>, valid: &Mask) -> [f64; 3] {
+    let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
+    lit.fold([0.0; 3], |sum, (LinearRgb(rgb), _)| [0, 1, 2].map(|c| sum[c] + f64::from(rgb[c])))
+}
+
+fn weighted_luminance(sum: &[f64; 3], weight: &[f64; 3]) -> f64 {
+    luminance([0, 1, 2].map(|c| sum[c] * weight[c]))
+}
+
+fn luminance(rgb: [f64; 3]) -> f64 {
+    LUMINANCE.iter().zip(rgb).map(|(weight, value)| weight * value).sum()
+}
+
+/// Radiances fitted to the input view: the mean of two fits to independent streams of samples, each with the proof that no
+/// other radiances fit better.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedRadiances {
+    /// Whether they belong to a light stage; otherwise they multiply the radiances of the scene's own emitters.
+    pub stage: bool,
+    /// The radiance of each light.
+    pub lights: Vec<FittedRadiance>,
+    /// Mean absolute difference of the averaged pictures, linear, for each channel; of both fits. Where the photo is clipped,
+    /// only missing light counts.
+    pub mean_absolute_error: [f64; 3],
+    /// What the ridge adds to that error, mean of both fits.
+    pub ridge: [f64; 3],
+    /// Lower bound of their sum, mean of both fits: no other radiances can have less.
+    pub lower_bound: [f64; 3],
+}
+
+/// One light's radiance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedRadiance {
+    /// The light's name.
+    pub light: String,
+    /// Linear Rec. 709.
+    pub radiance: [f64; 3],
+    /// Half the difference between both fits: a sample of the noise of `radiance`.
+    pub spread: [f64; 3],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Protocol;
+
+    fn flat(value: f32) -> Picture<LinearRgb> {
+        Picture::filled(2, 1, LinearRgb([value; 3]))
+    }
+
+    /// Those of the protocol, with the names that twins use besides.
+    fn rules() -> RelitRules {
+        RelitRules { alone_at_most: 3, ..Protocol::named("mateval-3").unwrap().light.relit }
+    }
+
+    fn sums(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<[f64; 3]> {
+        groups.iter().map(|picture| light_of(picture, valid)).collect()
+    }
+
+    fn names(groups: &[Picture<LinearRgb>]) -> Vec<String> {
+        lightings(&rules(), &sums(groups, &Mask::filled(2, 1, true)))
+            .into_iter()
+            .map(|lighting| lighting.name.to_string())
+            .collect()
+    }
+
+    #[test]
+    fn names_are_parsed_from_what_they_print() {
+        for name in [LightingName::WarmCool, LightingName::Alone(1), LightingName::Alone(12)] {
+            assert_eq!(name.to_string().parse(), Ok(name));
+        }
+        for word in ["", "dim", "alone", "alone_", "alone_01", "alone_+1", "Warm_cool"] {
+            assert!(
+                word.parse::<LightingName>().unwrap_err().to_string().contains("is not a lighting's name"),
+                "{word}"
+            );
+        }
+    }
+
+    /// Weights divided by their first positive one: exposure scales all alike.
+    fn relative(lighting: &RelitLighting) -> LightMix {
+        let unit = lighting.weights.iter().flatten().copied().find(|weight| *weight > 0.0).unwrap();
+        lighting.weights.iter().map(|rgb| rgb.map(|weight| weight / unit)).collect()
+    }
+
+    #[test]
+    fn groups_take_turns_by_brightness() {
+        let groups = [flat(1.0), flat(4.0), flat(0.0), flat(2.0), flat(0.5)];
+        let all = lightings(&rules(), &sums(&groups, &Mask::filled(2, 1, true)));
+        assert_eq!(names(&groups), ["warm_cool", "alone_1", "alone_2", "alone_3"]);
+        let RelitRules { warm, cool, .. } = rules();
+        let expected = [warm, warm, [1.0; 3], cool, cool].map(|rgb| rgb.map(|weight| weight / warm[0]));
+        for (found, expected) in relative(&all[0]).iter().flatten().zip(expected.as_flattened()) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+        assert_eq!(relative(&all[1]), [[0.0; 3], [1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
+        assert_eq!(relative(&all[3])[0], [1.0; 3]);
+    }
+
+    /// A group of 4 % of the light takes no turn and keeps weight 1 before exposure; one of 6 % does.
+    #[test]
+    fn faint_groups_take_no_turn() {
+        assert_eq!(names(&[flat(96.0), flat(4.0)]), ["warm_cool"]);
+        assert_eq!(names(&[flat(94.0), flat(6.0)]), ["warm_cool", "alone_1", "alone_2"]);
+    }
+
+    /// Every lighting shows the input view as bright as the scene's own lights do.
+    #[test]
+    fn lightings_are_as_bright_as_the_photo() {
+        let groups = [flat(1.0), flat(4.0), Picture::filled(2, 1, LinearRgb([0.5, 2.0, 9.0]))];
+        let mask = Mask::filled(2, 1, true);
+        let brightness = |weights: &[[f64; 3]]| -> f64 {
+            let pairs = groups.iter().zip(weights);
+            pairs
+                .map(|(group, w)| {
+                    let s = light_of(group, &mask);
+                    luminance([0, 1, 2].map(|c| s[c] * w[c]))
+                })
+                .sum()
+        };
+        let own = brightness(&[[1.0; 3]; 3]);
+        let all = lightings(&rules(), &sums(&groups, &mask));
+        assert_eq!(all.len(), 4);
+        for lighting in &all {
+            assert!((brightness(&lighting.weights) / own - 1.0).abs() < 1e-12, "{}", lighting.name);
+        }
+    }
+
+    #[test]
+    fn one_group_has_one_and_darkness_none() {
+        assert_eq!(names(&[flat(1.0)]), ["warm_cool"]);
+        assert_eq!(names(&[flat(0.0), flat(3.0)]), ["warm_cool"]);
+        assert!(names(&[flat(0.0)]).is_empty() && names(&[]).is_empty());
+        // What is not valid does not count.
+        let groups = [flat(1.0), Picture::from_fn(2, 1, |x, _| LinearRgb([[9.0, 0.5][x]; 3]))];
+        let valid = Mask::from_fn(2, 1, |x, _| x == 1);
+        assert_eq!(relative(&lightings(&rules(), &sums(&groups, &valid))[1])[0], [1.0; 3]);
+    }
+
+    /// A faint group that is once alone is sampled more often than its light in the other pictures would deserve.
+    #[test]
+    fn shares_follow_the_pictures() {
+        let sums = [[9.0; 3], [1.0; 3]];
+        let own = vec![[1.0; 3]; 2];
+        let shares = |mixes: &[LightMix]| {
+            let shares = group_shares(mixes, &sums);
+            shares[1] / shares[0]
+        };
+        assert!((shares(std::slice::from_ref(&own)) - 1.0 / 9.0).abs() < 1e-12);
+        let alone = vec![[0.0; 3], [10.0; 3]];
+        assert!((shares(&[own, alone]) - (1.01_f64.sqrt() / 0.9)).abs() < 1e-12);
+        assert_eq!(group_shares(&[vec![[0.0; 3]; 2]], &sums), [0.0; 2]);
+    }
+}

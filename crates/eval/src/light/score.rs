@@ -1,0 +1,169 @@
+//! The metrics of predictions under light: of each region of every view, and of each instance.
+
+use std::collections::BTreeMap;
+
+use mateval_image::{Mask, Picture};
+use mateval_metrics::{MetricError, Psnr, flip};
+use mateval_scene::{Camera, SceneId};
+use rayon::prelude::*;
+
+use super::blocks::noise_blocks;
+use super::difference::LightDifference;
+use super::error::{LightMse, mean_psnr_error};
+use super::fitted::score_fitted;
+use super::lit_picture::{Each, LitPicture};
+use super::own::score_own;
+use super::rules::Track;
+use crate::error::EvalError;
+use crate::measure::{round_to_steps, similarities};
+use crate::metric::Metric;
+use crate::protocol::Protocol;
+use crate::result::PictureValues;
+use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Surfaces, Views};
+use crate::scene_score::ScoreSheet;
+use crate::scene_task::{BaseColors, MaskedRegion, SceneTask, regions};
+use crate::truth::ViewTruth;
+
+/// Scores every submission under the lights of protocol number `at`.
+pub(crate) fn score_light(
+    task: &SceneTask<'_>,
+    truths: &[ViewTruth],
+    base_colors: &BaseColors,
+    at: usize,
+    sheets: &mut [Vec<ScoreSheet>],
+) -> Result<(), EvalError> {
+    let protocol = &task.protocols[at];
+    let meter = LightMeter::new(task, truths, protocol);
+    let mut each = |submission: usize, picture: LitPicture| meter.measure(&picture, &mut sheets[submission][at]);
+    compare_light(task, truths, base_colors, protocol, &mut each)
+}
+
+/// Renders every submission under each light of the protocol whose reference the dataset holds, and passes it on.
+pub(crate) fn compare_light(
+    task: &SceneTask<'_>,
+    truths: &[ViewTruth],
+    base_colors: &BaseColors,
+    protocol: &Protocol,
+    each: &mut Each<'_>,
+) -> Result<(), EvalError> {
+    let tracks = &protocol.light.tracks;
+    if let Some(reference) = task.reference.filter(|_| tracks.contains(&Track::True)) {
+        score_own(task, reference, truths, base_colors, protocol, each)?;
+    }
+    if let Some(renderer) = task.renderer.filter(|_| tracks.contains(&Track::Fitted)) {
+        score_fitted(task, renderer, truths, base_colors, protocol, each)?;
+    }
+    Ok(())
+}
+
+/// Measures pictures of light under one protocol.
+struct LightMeter<'a> {
+    task: &'a SceneTask<'a>,
+    protocol: &'a Protocol,
+    truths: &'a [ViewTruth],
+    /// The regions of each view.
+    regions: Vec<Vec<MaskedRegion>>,
+    /// The noise blocks of each view.
+    blocks: Vec<Picture<u32>>,
+}
+
+impl<'a> LightMeter<'a> {
+    fn new(task: &'a SceneTask<'a>, truths: &'a [ViewTruth], protocol: &'a Protocol) -> Self {
+        let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
+        let blocks = noise_blocks(&protocol.light.samples, &cameras);
+        Self { task, protocol, truths, regions: truths.iter().map(regions).collect(), blocks }
+    }
+
+    fn measure(&self, picture: &LitPicture<'_>, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
+        let kind = picture.track.picture();
+        // Relit light has no specular regions of its own.
+        let is_wanted = |region: &&MaskedRegion| match region.surfaces {
+            Surfaces::All => true,
+            Surfaces::Specular => kind == PictureKind::RgbTrue && region.region == Region::Valid,
+        };
+        let jobs: Vec<(usize, &MaskedRegion)> = (0..self.regions.len())
+            .flat_map(|view| self.regions[view].iter().filter(is_wanted).map(move |region| (view, region)))
+            .collect();
+        let measured: Vec<_> =
+            jobs.par_iter().map(|&(view, region)| self.values(picture, kind, view, region)).collect();
+        let mut errors: BTreeMap<(PictureName, Views), Vec<LightMse>> = BTreeMap::new();
+        for (&(view, region), measured) in jobs.iter().zip(measured) {
+            let view = self.task.views[view];
+            let (values, mse) = self.task.locate_error(view, measured)?;
+            errors.entry((values.picture, Views::of(&view.id, region.region))).or_default().extend(mse);
+            sheet.score.pictures.push(values);
+        }
+        for ((picture, views), mses) in errors {
+            let key = ResultKey { picture, views, metric: Metric::Psnr };
+            sheet.light_errors.entry(key).or_default().extend(mses);
+        }
+        sheet.score.fit = picture.fit.clone().or(sheet.score.fit.take());
+        sheet.score.not_finite += picture.not_finite;
+        if picture.track != Track::Relit {
+            self.add_instance_errors(kind, &picture.views, sheet);
+        }
+        Ok(())
+    }
+
+    /// The values of one region of a view, and its error with the noise by block.
+    fn values(
+        &self,
+        picture: &LitPicture<'_>,
+        kind: PictureKind,
+        view: usize,
+        region: &MaskedRegion,
+    ) -> Result<(PictureValues, Option<LightMse>), MetricError> {
+        let (found, blocks) = (&picture.views[view], &self.blocks[view]);
+        let mut mse = LightMse::new(found, &region.mask, blocks)?;
+        if let (Some(mse), Some(fits)) = (&mut mse, &picture.of_fits) {
+            let [a, b] = fits.each_ref().map(|fit| LightMse::new(&fit[view], &region.mask, blocks));
+            mse.common = a?.zip(b?).map_or(0.0, |(a, b)| (a.mse - b.mse) / 2.0);
+        }
+        let scene: &SceneId = &self.task.scene.id;
+        let mut values = region.values(scene, &self.task.views[view].id, kind, picture.lighting);
+        if let Some(mse) = &mse {
+            let Psnr { db, exact } = mse.psnr()?;
+            values.values.extend([(Metric::Mse, mse.mse), (Metric::Psnr, db)]);
+            values.mse_error = Some(mse.standard_error());
+            (values.exact, values.lower_bound) = (exact, mse.is_lower_bound());
+        }
+        if region.is_whole() && mse.is_some() {
+            let (shown, reference) = (&found.shown, &picture.references[view]);
+            let features = &reference.features;
+            let pair = [shown, &reference.picture];
+            similarities(self.protocol, self.task.lpips, pair, features, &region.mask, &mut values)?;
+            if kind == PictureKind::RgbTrue {
+                let value = flip(shown, &reference.picture, &region.mask)?;
+                values.values.extend(value.map(|value| (Metric::Flip, round_to_steps(self.protocol, value))));
+            }
+        }
+        Ok((values, mse))
+    }
+
+    fn add_instance_errors(&self, kind: PictureKind, found: &[LightDifference], sheet: &mut ScoreSheet) {
+        for ((view, truth), found) in self.task.views.iter().zip(self.truths).zip(found) {
+            let error = |k: usize| {
+                let [x, y] = found.halves.each_ref().map(|half| half.pixels()[k].0.map(f64::from));
+                (0..3).map(|c| x[c] * y[c]).sum::<f64>() / 3.0
+            };
+            let mut add = |region: Region, mask: &Mask| {
+                sheet.errors.add(kind, Views::of(&view.id, region), &truth.instances, mask, error);
+            };
+            add(Region::Valid, &truth.valid);
+            truth.unobserved.iter().for_each(|unobserved| add(Region::Unobserved, unobserved));
+        }
+    }
+}
+
+impl ScoreSheet {
+    /// States the noise of the scene's mean PSNRs, once all pictures have been measured. Where one is a lower bound, a
+    /// standard error would say nothing.
+    pub(crate) fn state_noise(&mut self) {
+        for (key, mses) in std::mem::take(&mut self.light_errors) {
+            if mses.iter().any(LightMse::is_lower_bound) {
+                continue;
+            }
+            self.score.noise.extend(mean_psnr_error(&mses).map(|error| (key, error)));
+        }
+    }
+}
