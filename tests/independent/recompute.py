@@ -8,6 +8,7 @@ with 1 if one is above its bound. PROTOCOL.md describes each step.
 
 import collections
 import json
+import os
 import pathlib
 import sys
 
@@ -256,6 +257,8 @@ def main(dataset, pictures, result, weights=None):
     scores, similarity = result["protocols"]["mateval-3"], Similarity(weights)
     skipped = [word for word, tool in (("lpips_alex", similarity.lpips), ("flip", similarity.flip)) if tool is None]
     wrong, compared, worst = [], 0, {}
+    if skipped and os.environ.get("MATEVAL_REQUIRE_DATA") == "1":
+        wrong.append(f"{' and '.join(skipped)} cannot be compared, and MATEVAL_REQUIRE_DATA=1 requires it")
 
     def compare(place, stated, found):
         nonlocal compared

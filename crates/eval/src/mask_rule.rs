@@ -76,7 +76,7 @@ fn windows(inside: Option<MaskedSsim>) -> Counted {
 pub(crate) struct ReferenceFeatures(Mutex<Vec<(Option<Mask>, Arc<Features>)>>);
 
 impl ReferenceFeatures {
-    /// Those of the whole reference; none where it is too small for the network. The reference is the same at every call.
+    /// Those of the whole reference; absent if it is too small for the network. The reference is the same at every call.
     pub(crate) fn whole(
         &self,
         lpips: &Lpips,

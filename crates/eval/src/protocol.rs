@@ -35,7 +35,7 @@ pub struct Protocol {
     pub wide_views: bool,
     /// The number of decimals to which LPIPS and FLIP are rounded: the last bits of LPIPS depend on the processor.
     pub rounded_decimals: u32,
-    /// The numbers that a table would print, the first of which orders boards.
+    /// The numbers that a table would print; the first orders boards.
     pub headline: Vec<ResultKey>,
     /// The light under which predictions are compared.
     pub light: LightRules,

@@ -18,7 +18,7 @@ use crate::pictures_dir::PicturesDir;
 use crate::protocol::Protocol;
 use crate::result::PictureValues;
 use crate::result_key::{PictureKind, PictureName, Region, Surfaces};
-use crate::truth::{ViewTruth, intersection};
+use crate::truth::ViewTruth;
 
 /// Everything that is needed to score submissions on one scene.
 #[derive(Clone)]
@@ -101,8 +101,11 @@ pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
     let all = |region, mask: &Mask| MaskedRegion { region, surfaces: Surfaces::All, mask: mask.clone() };
     let mut regions = vec![all(Region::Valid, &truth.valid)];
     regions.extend(truth.unobserved.as_ref().map(|mask| all(Region::Unobserved, mask)));
-    let specular = truth.specular.as_ref().map(|specular| intersection(specular, &truth.valid));
-    regions.extend(specular.map(|mask| MaskedRegion { region: Region::Valid, surfaces: Surfaces::Specular, mask }));
+    regions.extend(truth.specular.as_ref().map(|mask| MaskedRegion {
+        region: Region::Valid,
+        surfaces: Surfaces::Specular,
+        mask: mask.clone(),
+    }));
     regions
 }
 

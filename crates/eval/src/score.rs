@@ -393,7 +393,7 @@ fn has_references(dataset: &Dataset) -> bool {
         || dataset.scenes.iter().any(|scene| dataset.folder(&scene.id).scorer().exists())
 }
 
-/// The verdict of `prep compare` on this very dataset; none where it was not run.
+/// The verdict of `prep compare` on this very dataset; absent if it was not run.
 fn tracer_check(dataset: &Dataset) -> Result<Option<TracerCheck>, EvalError> {
     let file = CompareFile::read_beside(&dataset.root)?;
     let file = file.filter(|file| file.manifest_sha256 == dataset.file.manifest_sha256);
@@ -430,7 +430,7 @@ fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Find
     .collect()
 }
 
-/// The maps of which a submission's files hold none.
+/// The maps that a submission's files do not contain.
 fn not_predicted(files: &[HashedFile]) -> Vec<Map> {
     let is_of = |file: &HashedFile, map: Map| {
         let name = file.path.rsplit('/').next().unwrap_or_default();

@@ -73,7 +73,7 @@ pub fn photo_of_renderer(
 }
 
 /// The pixels where both masks are set. The masks have the same size.
-pub(crate) fn intersection(a: &Mask, b: &Mask) -> Mask {
+fn intersection(a: &Mask, b: &Mask) -> Mask {
     Mask::from_fn(a.width(), a.height(), |x, y| a.get(x, y) && b.get(x, y))
 }
 

@@ -343,7 +343,7 @@ mod tests {
 
     /// Without features, a pixel is its difference of colours. Black and white by hand: 100^0.7 lies beyond the split
     /// of 0.4 times 41.2760, the compressed difference of green and blue. The tool finds 0.967388 and, for the greys,
-    /// 0.206027: its features of flat pictures are rounding errors of about 1e-8, of which it takes the square root.
+    /// 0.206027: its features of flat pictures are rounding errors of about 1e-8, and it takes their square root.
     #[test]
     fn flat_pictures_differ_by_their_colours_alone() {
         let flat = |value: f32| Picture::filled(8, 8, SrgbRgb([value; 3]));

@@ -140,7 +140,7 @@ fn quoted(format: &str) -> String {
     format!("\"{format}\"")
 }
 
-/// The value of the key `format`; none where there is none, as in files that are no JSON.
+/// The value of the key `format`; absent if the file has no such key or is no JSON.
 fn format_of(bytes: &[u8]) -> Option<String> {
     #[derive(Deserialize)]
     struct Head {

@@ -43,7 +43,7 @@ pub struct CompareCounts {
 }
 
 impl CompareFile {
-    /// The file of the dataset in `root`; none where it does not exist. It may be about an earlier state of the dataset.
+    /// The file of the dataset in `root`; absent if it does not exist. It may be about an earlier state of the dataset.
     pub fn read_beside(root: &Path) -> Result<Option<Self>, SceneError> {
         let path = root.join(COMPARE);
         if !path.exists() {

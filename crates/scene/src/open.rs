@@ -104,7 +104,7 @@ impl Dataset {
         Ok(chosen[0])
     }
 
-    /// The renderer that made the scene's input picture; none where the dataset has no photo renderer, or where the scene has
+    /// The renderer that made the scene's input picture; absent if the dataset has no photo renderer, or where the scene has
     /// a photo from elsewhere, whose light is not known.
     pub fn photo_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
         self.file.photo_renderer.as_ref().filter(|_| scene.photo.is_none())

@@ -31,7 +31,7 @@ pub const LEAST_BASE_COLOR: f32 = 0.05;
 /// What a view shows, without noise. All pictures have one size.
 #[derive(Clone, Copy)]
 pub struct Surfaces<'a> {
-    /// Linear. Light is divided by it; none where what is filtered does not follow the base colour.
+    /// Linear. Light is divided by it; absent if what is filtered does not follow the base colour.
     pub base_color: Option<&'a Picture<LinearRgb>>,
     /// Instance index of each pixel.
     pub instances: &'a Picture<u16>,

@@ -63,7 +63,7 @@ fn variance<'a>(blocks: impl Iterator<Item = &'a BlockNoise>, common: f64) -> f6
 }
 
 impl LightMse {
-    /// The error over the pixels of the mask and their channels; none where no pixel counts. `blocks` holds the block of each
+    /// The error over the pixels of the mask and their channels; absent if no pixel counts. `blocks` holds the block of each
     /// pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
     pub fn new(difference: &LightDifference, mask: &Mask, blocks: &Picture<u32>) -> Result<Option<Self>, MetricError> {
         let LightDifference { halves: [first, second], noise: [u, v], .. } = difference;

@@ -86,7 +86,7 @@ impl Paths<'_> {
 }
 
 /// Predictions that share paths, by their numbers: those that agree in roughness and metallic, as many as the tracer takes at
-/// once beside `others` more and as fit in memory, of which each takes `bytes`.
+/// once beside `others` more and as fit in memory, where each takes `bytes`.
 pub(crate) fn batches(predictions: &[PredictedScene], others: usize, bytes: u64) -> Vec<Vec<usize>> {
     let mut alike: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (index, prediction) in predictions.iter().enumerate() {

@@ -206,7 +206,7 @@ impl StoredReference {
         Self::check(dataset, scene)
     }
 
-    /// The scene's reference; none where it has none. Fails where it cannot be used: it was made by another version or from
+    /// The scene's reference; absent if it has none. Fails where it cannot be used: it was made by another version or from
     /// other files, or a picture is missing or changed.
     pub(crate) fn check(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Self>, EvalError> {
         let folder = dataset.folder(&scene.id).scorer();

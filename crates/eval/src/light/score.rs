@@ -1,7 +1,5 @@
 //! The metrics of predictions under light: of each region of every view, and of each instance.
 
-use std::collections::BTreeMap;
-
 use mateval_image::{Mask, Picture};
 use mateval_metrics::{MetricError, Psnr, flip};
 use mateval_scene::{Camera, SceneId};
@@ -19,7 +17,7 @@ use crate::measure::{round_to_steps, similarities};
 use crate::metric::Metric;
 use crate::protocol::Protocol;
 use crate::result::PictureValues;
-use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Surfaces, Views};
+use crate::result_key::{PictureKind, Region, Surfaces, Views};
 use crate::scene_score::ScoreSheet;
 use crate::scene_task::{BaseColors, MaskedRegion, SceneTask, regions};
 use crate::truth::ViewTruth;
@@ -86,16 +84,11 @@ impl<'a> LightMeter<'a> {
             .collect();
         let measured: Vec<_> =
             jobs.par_iter().map(|&(view, region)| self.values(picture, kind, view, region)).collect();
-        let mut errors: BTreeMap<(PictureName, Views), Vec<LightMse>> = BTreeMap::new();
-        for (&(view, region), measured) in jobs.iter().zip(measured) {
+        for (&(view, _), measured) in jobs.iter().zip(measured) {
             let view = self.task.views[view];
             let (values, mse) = self.task.locate_error(view, measured)?;
-            errors.entry((values.picture, Views::of(&view.id, region.region))).or_default().extend(mse);
+            sheet.light_errors.entry(values.key(Metric::Psnr)).or_default().extend(mse);
             sheet.score.pictures.push(values);
-        }
-        for ((picture, views), mses) in errors {
-            let key = ResultKey { picture, views, metric: Metric::Psnr };
-            sheet.light_errors.entry(key).or_default().extend(mses);
         }
         sheet.score.fit = picture.fit.clone().or(sheet.score.fit.take());
         sheet.score.not_finite += picture.not_finite;
