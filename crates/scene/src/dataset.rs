@@ -14,7 +14,7 @@ use crate::role::{Role, SceneLights, SourceKind};
 pub const FORMAT: &str = "mateval/3";
 
 /// The version before it, which `mateval prep render --only scorer` brings up to date.
-pub const PREVIOUS_FORMAT: &str = "mateval/3";
+pub const PREVIOUS_FORMAT: &str = "mateval/2";
 
 /// `dataset.json`: what this dataset is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
