@@ -3,40 +3,50 @@
 //! In: a dataset with its ground truth, a submission, the weights of LPIPS. Out: [`result::ResultFile`], or, from [`verify`],
 //! whether a result states what the submission scores.
 //!
-//! [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those that they may not. For each scene of
+//! [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those that they may not. For each [`scene`] of
 //! the dataset, [`score()`](score::score) reads the submissions' maps
-//! ([`read_scene`](mateval_submission::prediction::read_scene)), and `scene_score` takes three steps:
+//! ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
 //!
-//! 1. `material_score` looks up the maps in every view ([`material_pictures`]), removes their scale ([`alignment`]) and
-//!    compares the pictures with the truth's ([`measure`]).
-//! 2. [`light`] renders the maps under every light and compares the renders with the scorer's own render of the true maps.
-//! 3. `material_score` compares the maps texel by texel ([`texture_space`]).
+//! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]), removes their scale, and compares the
+//!    pictures with the [`truth`]'s.
+//! 2. [`light`] renders the maps under every light and compares the renders with R, the scorer's own render of the true maps
+//!    ([`light::reference`]). The true maps travel along the paths of every prediction ([`light::predictions`]), so that what
+//!    few paths miss or exaggerate of both cancels: [`light::difference`] turns four quarters into two estimates of the encoded
+//!    difference from R, which are exactly zero for the true maps, and [`light::error`] states their noise. Protocol `paper`
+//!    compares with the photo's renderer instead ([`light::fitted`]).
+//! 3. [`materials::texels`] compares the maps texel by texel.
 //!
-//! A [`result`] lists every value by scene, view and picture, with its key ([`result_key`]), and their means ([`means`]):
-//! pictures to scenes, scenes to the dataset.
+//! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
+//! ([`result::means`]): pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.
 
-pub mod alignment;
 pub mod error;
 pub mod fixed_rules;
-pub mod light;
 pub mod mask_rule;
-pub mod material_pictures;
-mod material_score;
-pub mod means;
-pub mod measure;
-pub mod metric;
-pub mod open_scene;
-pub mod pictures_dir;
 pub mod protocol;
 pub mod result;
-pub mod result_key;
-mod scene_score;
-mod scene_task;
+pub mod scene;
 pub mod score;
-pub mod shown_scene;
-pub mod texture_space;
+pub mod shown;
 pub mod truth;
 pub mod verify;
 pub mod word_enum;
+
+pub mod materials {
+    //! Submissions' maps compared with the true ones, without light.
+    pub mod pictures;
+    pub mod score;
+    pub mod texels;
+}
+
+pub mod light {
+    //! Submissions under light.
+    pub mod difference;
+    pub mod error;
+    pub mod fitted;
+    pub mod lighting;
+    pub mod predictions;
+    pub mod reference;
+    pub(crate) mod score;
+}
 
 pub use error::EvalError;

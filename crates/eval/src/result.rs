@@ -10,10 +10,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::light::lighting::{FittedRadiances, LightingName};
-use crate::metric::Metric;
 use crate::protocol::Protocol;
-use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
-use crate::word_enum::UnknownWord;
+use crate::result::key::{Metric, PictureKind, PictureName, Region, ResultKey, Views};
+use crate::word_enum::{UnknownWord, by_text};
+
+pub mod key;
+pub mod means;
 
 /// The word for this version of a result.
 pub const RESULT_FORMAT: &str = "mateval-result/6";
@@ -224,29 +226,15 @@ impl std::fmt::Display for MissingNumbers {
     }
 }
 
-impl TryFrom<String> for MissingNumbers {
-    type Error = UnknownWord;
+impl std::str::FromStr for MissingNumbers {
+    type Err = UnknownWord;
 
-    fn try_from(word: String) -> Result<Self, UnknownWord> {
+    fn from_str(word: &str) -> Result<Self, UnknownWord> {
         word.parse().map(Self::Metric).or_else(|_| word.parse().map(Self::Picture))
     }
 }
 
-impl From<MissingNumbers> for String {
-    fn from(numbers: MissingNumbers) -> Self {
-        numbers.to_string()
-    }
-}
-
-impl JsonSchema for MissingNumbers {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "MissingNumbers".into()
-    }
-
-    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        schemars::json_schema!({ "type": "string", "pattern": "^[a-z0-9_]+$" })
-    }
-}
+by_text!(MissingNumbers, UnknownWord, "^[a-z0-9_]+$");
 
 impl PictureValues {
     /// The mean that one of its values counts for.

@@ -21,18 +21,15 @@ use mateval_submission::submission_json::SubmissionJson;
 
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
-use crate::light::rules::Track;
 use crate::light::score::score_light;
-use crate::metric::{LPIPS_NET, Metric};
-use crate::open_scene::ViewSet;
-use crate::open_scene::{OpenScene, check_photos, scored_views};
-use crate::pictures_dir::PicturesDir;
-use crate::protocol::Protocol;
+use crate::protocol::{Protocol, Track};
+use crate::result::key::{LPIPS_NET, Metric, PictureKind};
+use crate::result::means::{means, summary_noise};
 use crate::result::{
     MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
 };
-use crate::scene_score::{SceneScore, ScoreSheet};
-use crate::scene_task::SceneTask;
+use crate::scene::{OpenScene, SceneScore, SceneTask, ScoreSheet, ViewSet, check_photos, scored_views};
+use crate::shown::PicturesDir;
 
 /// The network of LPIPS, or the reason why it is missing.
 pub enum LpipsWeights {
@@ -360,7 +357,7 @@ fn finish(
     entry.findings.extend(not_predicted.iter().map(|map| not_predicted_finding(*map)));
     let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
         let fingerprint = protocol.fingerprint(manifest, &ids, weights);
-        (protocol.name.clone(), ProtocolResult::new(protocol, fingerprint, scores, &not_predicted))
+        (protocol.name.clone(), protocol_result(protocol, fingerprint, scores, &not_predicted))
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
     let missing = missing(plan, scored);
@@ -385,6 +382,31 @@ fn finish(
         missing,
         findings: entry.findings,
     }
+}
+
+/// The scores of one submission under one protocol, scene by scene, without those of maps that it does not predict.
+fn protocol_result(
+    protocol: &Protocol,
+    fingerprint: String,
+    scores: Vec<(SceneId, SceneScore)>,
+    not_predicted: &[Map],
+) -> ProtocolResult {
+    let has_value = |kind: PictureKind| kind.map().is_none_or(|map| !not_predicted.contains(&map));
+    let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
+    for (scene, score) in scores {
+        pictures.extend(score.pictures.into_iter().filter(|picture| has_value(picture.picture.kind)));
+        texels.extend(score.texels.into_iter().filter(|_| has_value(PictureKind::TextureBaseColor)));
+        instances.extend(score.instances.into_iter().filter(|errors| has_value(errors.picture)));
+        if !score.noise.is_empty() {
+            noise.insert(scene.clone(), score.noise);
+        }
+        fits.extend(score.fit.map(|fit| (scene, fit)));
+    }
+    let (scenes, summary) = means(&pictures, &texels);
+    let summary_noise = summary_noise(&noise, &scenes);
+    let protocol = protocol.clone();
+    ProtocolResult { protocol, fingerprint, summary, scenes, summary_noise, noise, fits, pictures, texels, instances }
 }
 
 /// Whether the dataset was rendered by the scorer, so that scenes of unknown light aside each has a reference.

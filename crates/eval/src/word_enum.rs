@@ -1,4 +1,5 @@
-//! A macro for enums whose variants are words in files. It generates the only code that prints and parses them.
+//! Macros for types that are words in files: [`word_enum`] for enums whose variants are words, [`by_text`] for types that print
+//! and parse themselves.
 
 /// A word that an enum does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -75,3 +76,34 @@ macro_rules! word_enum {
     };
 }
 pub(crate) use word_enum;
+
+/// Serde and a schema by way of `Display` and `FromStr`. The pattern holds the shape alone: `dataset_spec/FORMAT.md` lists the
+/// words.
+macro_rules! by_text {
+    ($name:ident, $error:ty, $pattern:literal) => {
+        impl TryFrom<String> for $name {
+            type Error = $error;
+
+            fn try_from(text: String) -> Result<Self, $error> {
+                text.parse()
+            }
+        }
+
+        impl From<$name> for String {
+            fn from(name: $name) -> Self {
+                name.to_string()
+            }
+        }
+
+        impl schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                schemars::json_schema!({ "type": "string", "pattern": $pattern })
+            }
+        }
+    };
+}
+pub(crate) use by_text;

@@ -195,8 +195,9 @@ mod tests {
     use mateval_metrics::mse;
     use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
 
-    use super::*;
     use crate::light::error::LightMse;
+
+    use super::*;
 
     const SIDE: usize = 24;
 

@@ -10,17 +10,15 @@ use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_light::light_fit::{FitTarget, LightFit, fit_two_streams};
 use mateval_light::light_stage;
 use mateval_scene::{Camera, RendererId, SceneLights};
-use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, World};
+use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
 use rayon::prelude::*;
 
-use super::difference::{LightDifference, base_color_ratio, encoded, guided_mean};
-use super::lighting::{FittedRadiance, FittedRadiances};
-use super::lit_picture::{Each, EncodedReference, Guides, LitPicture, picture_of};
-use super::paths::{Paths, QUARTERS, batches};
-use super::rules::Track;
 use crate::error::EvalError;
-use crate::protocol::Protocol;
-use crate::scene_task::{BaseColors, SceneTask};
+use crate::light::difference::{LightDifference, encoded, guided_mean};
+use crate::light::lighting::{FittedRadiance, FittedRadiances};
+use crate::light::predictions::{Each, EncodedReference, Guides, LitPicture, Paths, batches, picture_of};
+use crate::protocol::{Protocol, Track};
+use crate::scene::{BaseColors, SceneTask};
 use crate::truth::{ViewTruth, photo_of_renderer};
 
 /// Fits every submission's lights, renders it under them and compares it with the photo's renderer.
@@ -48,33 +46,22 @@ pub(crate) fn score_fitted(
         let repaint = paths.repaint(&predictions, None)?;
         let fits = lit.fit(&paths, &repaint, task, truths, &photos)?;
         let mixes: Vec<Vec<LightMix>> = fits.iter().map(|fit| fit.streams.to_vec()).collect();
-        // By prediction, fit and view: the quarters, exposed.
-        let mut quarters = vec![[0, 1].map(|_| vec![Vec::new(); task.views.len()]); batch.len()];
-        let mut not_finite = vec![0; batch.len()];
-        for stream in QUARTERS {
-            let renders = paths.trace(&repaint, Lighting::Mixed(&mixes), &cameras, (samples / 2).max(1), stream)?;
-            for (at, render) in renders.iter().enumerate() {
-                not_finite[at] += render.stats.not_finite;
-                for (fit, views) in quarters[at].iter_mut().enumerate() {
-                    for (view, quarters) in views.iter_mut().enumerate() {
-                        quarters.push(exposed(task, picture_of(render, view, fit)));
-                    }
-                }
-            }
-        }
+        let picture = |renders: &[ViewsRender], at: usize, fit: usize, view: usize| {
+            exposed(task, picture_of(&renders[at], view, fit))
+        };
+        let (quarters, not_finite) = paths.quarters(&repaint, &mixes, &cameras, batch.len(), samples, picture)?;
         for (at, (&index, fit)) in batch.iter().zip(fits).enumerate() {
-            let [first, second] = std::mem::take(&mut quarters[at]);
-            let pairs = base_colors.predicted[index].iter().zip(&base_colors.truth);
-            let ratios: Vec<_> = pairs.map(|(prediction, truth)| base_color_ratio(prediction, truth)).collect();
+            let [first, second] = &quarters[at][..] else { unreachable!("two fits make two pictures") };
+            let ratios = base_colors.ratios(index);
             let guides = Guides { truths, ratios: &ratios, references: &exposed_photos };
             // The first half under the first fit, the second under the second.
             let both: Vec<[&Picture<LinearRgb>; 4]> =
-                first.iter().zip(&second).map(|(a, b)| [&a[0], &a[1], &b[2], &b[3]]).collect();
+                first.iter().zip(second).map(|(a, b)| [&a[0], &a[1], &b[2], &b[3]]).collect();
             let under = |quarters: &[Vec<Picture<LinearRgb>>]| {
                 let views: Vec<_> = quarters.iter().map(|view| [0, 1, 2, 3].map(|at| &view[at])).collect();
                 plain_differences(&views, &guides)
             };
-            let of_fits = Some([under(&first), under(&second)]);
+            let of_fits = Some([under(first), under(second)]);
             let (track, not_finite, fit) = (Track::Fitted, not_finite[at], Some(fit.radiances));
             let views = plain_differences(&both, &guides);
             each(

@@ -1,16 +1,15 @@
 //! Lightings: the scene's own emitters with weights that no method has seen, or radiances that were fitted.
 
-use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
 use mateval_tracer::LightMix;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rules::RelitRules;
-use crate::word_enum::UnknownWord;
+use crate::protocol::RelitRules;
+use crate::word_enum::{UnknownWord, by_text};
 
 /// The name of a lighting of track `relit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -49,29 +48,7 @@ impl FromStr for LightingName {
     }
 }
 
-impl TryFrom<String> for LightingName {
-    type Error = UnknownWord;
-
-    fn try_from(word: String) -> Result<Self, UnknownWord> {
-        word.parse()
-    }
-}
-
-impl From<LightingName> for String {
-    fn from(name: LightingName) -> Self {
-        name.to_string()
-    }
-}
-
-impl JsonSchema for LightingName {
-    fn schema_name() -> Cow<'static, str> {
-        "LightingName".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "string", "pattern": "^(warm_cool|alone_[1-9][0-9]*)$" })
-    }
-}
+by_text!(LightingName, UnknownWord, "^(warm_cool|alone_[1-9][0-9]*)$");
 
 /// A lighting of track `relit`.
 #[derive(Clone, Debug, PartialEq)]
@@ -184,8 +161,9 @@ pub struct FittedRadiance {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::protocol::Protocol;
+
+    use super::*;
 
     fn flat(value: f32) -> Picture<LinearRgb> {
         Picture::filled(2, 1, LinearRgb([value; 3]))

@@ -7,28 +7,25 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_image::exr_io::{self, Precision};
-use mateval_image::{LinearRgb, Mask, Picture, png_io};
+use mateval_image::exr_io::Precision;
+use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SCORER_JSON;
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::open::Dataset;
 use mateval_scene::scene_change::change_scene;
-use mateval_scene::scene_cost::{self, Step, TimedStep};
+use mateval_scene::scene_cost::{Step, TimedStep};
 use mateval_scene::scorer_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Camera, Progress, Report, SceneId, json};
+use mateval_scene::{Camera, Progress, Report, SceneId, json, scene_cost};
 use mateval_tracer::{LightGroups, Lighting, World};
 
-use super::difference::encoded;
-use super::paths::Paths;
-use super::rules::LightRules;
-use super::true_maps::true_maps;
 use crate::error::EvalError;
-use crate::open_scene::OpenScene;
-use crate::open_scene::ViewSet;
-use crate::protocol::Protocol;
-use crate::truth::check_sizes;
+use crate::light::difference::encoded;
+use crate::light::predictions::Paths;
+use crate::protocol::{LightRules, Protocol};
+use crate::scene::{OpenScene, ViewSet};
+use crate::truth::{check_sizes, true_maps};
 
 /// Rises whenever the pictures could change for the same inputs.
 pub const REFERENCE_VERSION: u32 = 1;

@@ -5,21 +5,16 @@ use mateval_metrics::{MetricError, Psnr, flip};
 use mateval_scene::{Camera, SceneId};
 use rayon::prelude::*;
 
-use super::blocks::noise_blocks;
-use super::difference::LightDifference;
-use super::error::{LightMse, mean_psnr_error};
-use super::fitted::score_fitted;
-use super::lit_picture::{Each, LitPicture};
-use super::own::score_own;
-use super::rules::Track;
 use crate::error::EvalError;
-use crate::measure::{round_to_steps, similarities};
-use crate::metric::Metric;
-use crate::protocol::Protocol;
+use crate::light::difference::LightDifference;
+use crate::light::error::{LightMse, mean_psnr_error, noise_blocks};
+use crate::light::fitted::score_fitted;
+use crate::light::predictions::{Each, LitPicture, score_own};
+use crate::materials::score::{round_to_steps, similarities};
+use crate::protocol::{Protocol, Track};
 use crate::result::PictureValues;
-use crate::result_key::{PictureKind, Region, Surfaces, Views};
-use crate::scene_score::ScoreSheet;
-use crate::scene_task::{BaseColors, MaskedRegion, SceneTask, regions};
+use crate::result::key::{Metric, PictureKind, Region, Surfaces, Views};
+use crate::scene::{BaseColors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::ViewTruth;
 
 /// Scores every submission under the lights of protocol number `at`.

@@ -1,19 +1,12 @@
-//! Means of a result, of pictures to scenes and of scenes to the dataset, when it is made and again when it is read.
+//! Means of a result: of pictures to scenes and of scenes to the dataset.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use mateval_metrics::Psnr;
-use mateval_scene::submission::Map;
-use mateval_scene::{SceneId, json};
+use mateval_scene::SceneId;
 
-use crate::error::EvalError;
-use crate::metric::Metric;
-use crate::protocol::Protocol;
-use crate::result::{InstanceTexelErrors, PictureValues, ProtocolResult, RESULT_FORMAT, ResultFile};
-use crate::result_key::{PictureKind, ResultKey, Views};
-use crate::scene_score::SceneScore;
-use crate::verify::differences::{Difference, differences};
+use crate::result::key::{Metric, PictureKind, ResultKey, Views};
+use crate::result::{InstanceTexelErrors, PictureValues};
 
 /// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over its
 /// scenes. A mean skips missing values; the dataset's mean of a key skips scenes without a value of that key.
@@ -68,7 +61,7 @@ fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<Res
 
 /// The standard error of the dataset's mean of each key, where every scene with a value has one. The noise of different
 /// scenes is independent. `scenes` are the scenes' means.
-pub(crate) fn summary_noise(
+pub fn summary_noise(
     noise: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     scenes: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
 ) -> BTreeMap<ResultKey, f64> {
@@ -81,64 +74,6 @@ pub(crate) fn summary_noise(
     let valued = |key: &ResultKey| scenes.values().filter(|values| values.contains_key(key)).count();
     let whole = sums.into_iter().filter(|(key, (count, _))| *count == valued(key));
     whole.map(|(key, (count, squares))| (key, squares.sqrt() / count as f64)).collect()
-}
-
-impl ResultFile {
-    /// Reads a result; fails where it has another format, is not valid, holds a number that this version does not know, or a
-    /// mean that is not that of its own numbers.
-    pub fn read(path: &Path) -> Result<Self, EvalError> {
-        let result: Self = json::read_format(path, RESULT_FORMAT)?;
-        match result.contradiction()? {
-            None => Ok(result),
-            Some(Difference { place, said, found }) => {
-                Err(EvalError::Contradiction { path: path.to_owned(), place, said, found })
-            }
-        }
-    }
-
-    /// The first mean that does not follow from the numbers below it: pictures to scenes, scenes to the summary.
-    fn contradiction(&self) -> Result<Option<Difference>, EvalError> {
-        for (name, scores) in &self.protocols {
-            let (scenes, summary) = means(&scores.pictures, &scores.texels);
-            let noise = summary_noise(&scores.noise, &scenes);
-            let value = |value: serde_json::Result<serde_json::Value>| value.map_err(EvalError::Compare);
-            let said = value(serde_json::to_value((&scores.scenes, &scores.summary, &scores.summary_noise)))?;
-            let found = value(serde_json::to_value((&scenes, &summary, &noise)))?;
-            if let Some(first) = differences(&said, &found).into_iter().next() {
-                let (at, rest) = first.place[1..].split_at(1);
-                let part = ["scenes", "summary", "summary_noise"][at.parse::<usize>().unwrap_or(0)];
-                return Ok(Some(Difference { place: format!("/protocols/{name}/{part}{rest}"), ..first }));
-            }
-        }
-        Ok(None)
-    }
-}
-
-impl ProtocolResult {
-    /// The scores of one submission under one protocol, scene by scene, without those of maps that it does not predict.
-    pub(crate) fn new(
-        protocol: &Protocol,
-        fingerprint: String,
-        scores: Vec<(SceneId, SceneScore)>,
-        not_predicted: &[Map],
-    ) -> Self {
-        let has_value = |kind: PictureKind| kind.map().is_none_or(|map| !not_predicted.contains(&map));
-        let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
-        for (scene, score) in scores {
-            pictures.extend(score.pictures.into_iter().filter(|picture| has_value(picture.picture.kind)));
-            texels.extend(score.texels.into_iter().filter(|_| has_value(PictureKind::TextureBaseColor)));
-            instances.extend(score.instances.into_iter().filter(|errors| has_value(errors.picture)));
-            if !score.noise.is_empty() {
-                noise.insert(scene.clone(), score.noise);
-            }
-            fits.extend(score.fit.map(|fit| (scene, fit)));
-        }
-        let (scenes, summary) = means(&pictures, &texels);
-        let summary_noise = summary_noise(&noise, &scenes);
-        let protocol = protocol.clone();
-        Self { protocol, fingerprint, summary, scenes, summary_noise, noise, fits, pictures, texels, instances }
-    }
 }
 
 #[derive(Default)]
@@ -162,9 +97,10 @@ impl Mean {
 mod tests {
     use mateval_scene::{InstanceId, ViewId};
 
-    use super::*;
     use crate::result::TexelErrors;
-    use crate::result_key::{PictureName, Region};
+    use crate::result::key::{PictureName, Region};
+
+    use super::*;
 
     fn key(text: &str) -> ResultKey {
         text.parse().unwrap()

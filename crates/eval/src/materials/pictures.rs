@@ -5,13 +5,12 @@ use std::cell::LazyCell;
 use glam::Vec2;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, TriangleMesh};
+use mateval_submission::prediction::PredictedScene;
 use mateval_tracer::aov::{
     COARSE_SUBPIXELS, PixelMean, SUBPIXELS, appearance, coarse_subpixels, flatness_values, places_through, subpixel,
 };
 use mateval_tracer::{Hit, World};
 use rayon::prelude::*;
-
-use mateval_submission::prediction::PredictedScene;
 
 /// A submission's maps as a view shows them; each pixel is a mean over its sub-pixels.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,21 +10,21 @@
 
 use std::path::Path;
 
-use mateval_image::Texture;
-use mateval_image::exr_io::{self, Precision};
+use mateval_image::exr_io::Precision;
+use mateval_image::{Texture, exr_io};
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::{InstanceId, Progress, Report, TriangleMesh};
+use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
+use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
 use mateval_tracer::World;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::light::true_maps::TruthMaterial;
-use crate::pictures_dir::PicturesDir;
-use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
-use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
+use crate::shown::PicturesDir;
+use crate::truth::TruthMaterial;
 
 /// Weighted squared errors over the observed, or the unobserved, texels of one or several instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -175,11 +175,11 @@ mod tests {
     use mateval_scene::material::{ColorInput, Material, MaterialModel};
     use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
     use mateval_scene::{Camera, Intrinsics, SceneId};
+    use mateval_submission::atlas_meshes::AtlasMeshes;
+    use mateval_submission::prediction::read_scene;
     use serde_json::json;
 
     use super::*;
-    use mateval_submission::atlas_meshes::AtlasMeshes;
-    use mateval_submission::prediction::read_scene;
 
     /// Two triangles in one plane, all seen, of `areas` square metres. In the atlas they are alike, one in its left half and
     /// one as far in its right half.

@@ -1,0 +1,438 @@
+//! The maps of submissions compared with the truth's in pictures, without light: the metrics of each region, of base colour also
+//! with its scale removed.
+
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
+use mateval_metrics::{Lpips, MetricError, Psnr, delta_e, mse};
+use mateval_scene::Report;
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_submission::prediction::PredictedScene;
+use rayon::prelude::*;
+
+use crate::error::EvalError;
+use crate::mask_rule::ReferenceFeatures;
+use crate::materials::pictures::{MaterialPictures, material_pictures};
+use crate::materials::texels::{InstanceTexels, TexelSums, texture_space};
+use crate::protocol::{AlbedoSpace, Protocol};
+use crate::result::key::{HALF_A_BYTE, Metric, PictureKind, Region, Surfaces, Views};
+use crate::result::{InstanceTexelErrors, PictureValues, TexelErrors};
+use crate::scene::{BaseColors, InstanceErrors, MaskedRegion, SceneTask, ScoreSheet, regions};
+use crate::truth::{ViewTruth, true_maps};
+
+/// One submission's pictures of a view.
+struct Predicted {
+    pictures: MaterialPictures,
+    /// The base colour as it is, and scaled by [`channel_scales`].
+    albedos: [(PictureKind, Albedo); 2],
+}
+
+impl Predicted {
+    fn new(pictures: MaterialPictures, truth: &ViewTruth) -> Self {
+        let raw = &pictures.base_color;
+        let aligned = scaled(raw, channel_scales(raw, &truth.albedo, &truth.valid));
+        let albedos =
+            [(PictureKind::Albedo, Albedo::new(raw.clone())), (PictureKind::AlbedoAligned, Albedo::new(aligned))];
+        Self { pictures, albedos }
+    }
+}
+
+/// The truth of a view, and what is shared between submissions and protocols.
+struct Truth<'a> {
+    view: &'a ViewTruth,
+    albedo: AlbedoReference,
+    regions: Vec<MaskedRegion>,
+}
+
+/// Gets a view, its number, the pictures of every submission and the base colour of the true atlases.
+type EachView<'a> = dyn FnMut(&View, usize, &[MaterialPictures], &Picture<LinearRgb>) -> Result<(), EvalError> + 'a;
+
+impl SceneTask<'_> {
+    /// Pictures of base colour, roughness and metallic, under the protocols that are `wanted` by their numbers. Returns the base
+    /// colours of the true atlases and of each submission.
+    pub(crate) fn score_materials(
+        &self,
+        truths: &[ViewTruth],
+        wanted: &(impl Fn(usize) -> bool + Sync),
+        sheets: &mut [Vec<ScoreSheet>],
+    ) -> Result<BaseColors, EvalError> {
+        self.each_view(&mut |view, at, pictures, true_base_color| {
+            for (kept, (submission, pictures)) in
+                self.pictures.into_iter().flat_map(|kept| pictures.iter().enumerate().map(move |at| (kept, at)))
+            {
+                kept.keep_maps(submission, (&self.scene.id, &view.id), pictures, true_base_color)?;
+            }
+            let truth = &truths[at];
+            let predicted: Vec<Predicted> =
+                pictures.par_iter().map(|pictures| Predicted::new(pictures.clone(), truth)).collect();
+            let albedo = AlbedoReference::new(truth.albedo.clone());
+            let truth = Truth { view: truth, albedo, regions: regions(truth) };
+            let protocols = (0..self.protocols.len()).filter(|&p| wanted(p));
+            let jobs: Vec<(usize, usize)> = protocols.flat_map(|p| (0..sheets.len()).map(move |s| (s, p))).collect();
+            let measured: Vec<_> = jobs
+                .par_iter()
+                .map(|&(s, p)| self.material_values(&self.protocols[p], view, &predicted[s], &truth))
+                .collect();
+            for ((s, p), values) in jobs.into_iter().zip(measured) {
+                let sheet = &mut sheets[s][p];
+                sheet.score.pictures.extend(values?);
+                self.material_errors(&self.protocols[p], view, &predicted[s], &truth, &mut sheet.errors);
+            }
+            Ok(())
+        })
+    }
+
+    /// The base colours of the true atlases and of each submission, in every view.
+    pub(crate) fn base_colors(&self) -> Result<BaseColors, EvalError> {
+        self.each_view(&mut |_, _, _, _| Ok(()))
+    }
+
+    /// Looks all maps up in every view; `each` gets the submissions' pictures and the base colour of the true atlases.
+    fn each_view(&self, each: &mut EachView<'_>) -> Result<BaseColors, EvalError> {
+        let blank = vec![Vec::new(); self.predictions.len()];
+        let mut base_colors = BaseColors { truth: Vec::new(), predicted: blank };
+        let true_maps = true_maps(self.folder, self.scene)?;
+        let all: Vec<&PredictedScene> = self.predictions.iter().chain([&true_maps]).collect();
+        for (at, view) in self.views.iter().enumerate() {
+            (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
+            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all);
+            let truth = pictures.pop().expect("the truth comes last").base_color;
+            each(view, at, &pictures, &truth)?;
+            base_colors.truth.push(truth);
+            for (base_colors, pictures) in base_colors.predicted.iter_mut().zip(pictures) {
+                base_colors.push(pictures.base_color);
+            }
+        }
+        Ok(base_colors)
+    }
+
+    /// All metrics of a view's raw albedo, aligned albedo, roughness and metallic. The scale of the aligned albedo is fitted
+    /// over all valid pixels and is the same for every region.
+    fn material_values(
+        &self,
+        protocol: &Protocol,
+        view: &View,
+        predicted: &Predicted,
+        truth: &Truth<'_>,
+    ) -> Result<Vec<PictureValues>, EvalError> {
+        let mut all = Vec::new();
+        let Predicted { pictures, albedos } = predicted;
+        for region in &truth.regions {
+            let (mask, whole) = (&region.mask, region.is_whole());
+            let blank = |kind| region.values(&self.scene.id, &view.id, kind, None);
+            if region.surfaces == Surfaces::All {
+                for (kind, albedo) in albedos {
+                    let mut values = blank(*kind);
+                    let found = measure_albedo(protocol, self.lpips, albedo, &truth.albedo, mask, whole, &mut values);
+                    self.locate_error(view, found)?;
+                    all.push(values);
+                }
+            }
+            let source = &self.scene.source;
+            let scalars = [
+                (PictureKind::Roughness, source.states_roughness, &pictures.roughness, &truth.view.roughness),
+                (PictureKind::Metallic, source.states_metallic, &pictures.metallic, &truth.view.metallic),
+            ];
+            for (kind, _, picture, truth) in scalars.into_iter().filter(|(_, is_stated, ..)| *is_stated) {
+                let mut values = blank(kind);
+                self.locate_error(view, measure_scalar(picture, truth, mask, &mut values))?;
+                if region.surfaces == Surfaces::Specular {
+                    // One number is enough to say how far off mirrors and metals are.
+                    values.values.remove(&Metric::Mse);
+                }
+                all.push(values);
+            }
+        }
+        Ok(all)
+    }
+
+    /// Adds the squared errors of raw and aligned albedo to the sums by instance.
+    fn material_errors(
+        &self,
+        protocol: &Protocol,
+        view: &View,
+        predicted: &Predicted,
+        truth: &Truth<'_>,
+        errors: &mut InstanceErrors,
+    ) {
+        let ViewTruth { instances, valid, unobserved, .. } = truth.view;
+        for (kind, albedo) in &predicted.albedos {
+            let (of, reference) = (albedo, &truth.albedo.albedo);
+            let error = |k: usize| match protocol.albedo_space {
+                AlbedoSpace::Linear => mean_square(of.linear.pixels()[k].0, reference.linear.pixels()[k].0),
+                AlbedoSpace::Srgb => mean_square(of.encoded.pixels()[k].0, reference.encoded.pixels()[k].0),
+            };
+            errors.add(*kind, Views::of(&view.id, Region::Valid), instances, valid, error);
+            if let Some(unobserved) = unobserved {
+                errors.add(*kind, Views::of(&view.id, Region::Unobserved), instances, unobserved, error);
+            }
+        }
+    }
+
+    /// Errors of texels; they are the same under every protocol.
+    pub(crate) fn score_texels(&self, sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
+        let found = texture_space(
+            self.folder,
+            self.scene,
+            self.world,
+            self.atlases,
+            self.predictions,
+            self.pictures,
+            self.progress,
+        )?;
+        for (sheets, instances) in sheets.iter_mut().zip(found) {
+            let errors: Vec<InstanceTexelErrors> =
+                instances.iter().map(|instance| texel_errors(self.scene, instance)).collect();
+            for sheet in sheets {
+                sheet.score.texels = errors.clone();
+            }
+        }
+        Ok(())
+    }
+}
+
+fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
+}
+
+fn texel_errors(scene: &SceneFile, instance: &InstanceTexels) -> InstanceTexelErrors {
+    let errors = |sums: &TexelSums| TexelErrors { area_m2: sums.area_m2, base_color_mse: sums.mse() };
+    InstanceTexelErrors {
+        scene: scene.id.clone(),
+        instance: instance.instance.clone(),
+        observed: errors(&instance.observed),
+        unobserved: errors(&instance.unobserved),
+    }
+}
+
+/// An albedo picture, linear and as SSIM and LPIPS see it.
+pub struct Albedo {
+    /// Linear Rec. 709.
+    pub linear: Picture<LinearRgb>,
+    /// Clipped to 0..1 and encoded.
+    pub encoded: Picture<SrgbRgb>,
+}
+
+/// A true albedo picture, with what LPIPS compares of it.
+pub struct AlbedoReference {
+    /// The picture.
+    pub albedo: Albedo,
+    features: ReferenceFeatures,
+}
+
+impl Albedo {
+    /// Encodes a linear picture.
+    pub fn new(linear: Picture<LinearRgb>) -> Self {
+        Self { encoded: linear.to_srgb(), linear }
+    }
+}
+
+impl AlbedoReference {
+    /// Encodes a linear picture.
+    pub fn new(linear: Picture<LinearRgb>) -> Self {
+        Self { albedo: Albedo::new(linear), features: ReferenceFeatures::default() }
+    }
+}
+
+/// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also SSIM, CIEDE2000 and (where its
+/// weights are loaded) LPIPS.
+pub fn measure_albedo(
+    protocol: &Protocol,
+    lpips: Option<&Lpips>,
+    prediction: &Albedo,
+    reference: &AlbedoReference,
+    mask: &Mask,
+    whole: bool,
+    values: &mut PictureValues,
+) -> Result<(), MetricError> {
+    let AlbedoReference { albedo: truth, features } = reference;
+    let Some(error) = albedo_mse(protocol, prediction, truth, mask)? else { return Ok(()) };
+    let Psnr { db, exact } = Psnr::from_mse(error)?;
+    values.values.extend([(Metric::Mse, error), (Metric::Psnr, db)]);
+    values.exact = exact;
+    if whole {
+        similarities(protocol, lpips, [&prediction.encoded, &truth.encoded], features, mask, values)?;
+        let difference = delta_e(&prediction.linear, &truth.linear, mask)?;
+        values.values.extend(difference.map(|value| (Metric::DeltaE, value)));
+    }
+    Ok(())
+}
+
+/// MSE of an albedo picture over the mask, in the protocol's space; none where no pixel counts.
+pub fn albedo_mse(
+    protocol: &Protocol,
+    prediction: &Albedo,
+    reference: &Albedo,
+    mask: &Mask,
+) -> Result<Option<f64>, MetricError> {
+    match protocol.albedo_space {
+        AlbedoSpace::Linear => mse(&prediction.linear, &reference.linear, Some(mask)),
+        AlbedoSpace::Srgb => mse(&prediction.encoded, &reference.encoded, Some(mask)),
+    }
+}
+
+/// Adds SSIM and (where its weights are loaded) LPIPS of a prediction and a reference, in this order.
+pub(crate) fn similarities(
+    protocol: &Protocol,
+    lpips: Option<&Lpips>,
+    [prediction, reference]: [&Picture<SrgbRgb>; 2],
+    features: &ReferenceFeatures,
+    mask: &Mask,
+    values: &mut PictureValues,
+) -> Result<(), MetricError> {
+    let (ssim, _) = protocol.mask_rule.ssim(prediction, reference, mask)?;
+    values.values.extend(ssim.map(|ssim| (Metric::Ssim, ssim)));
+    if let Some(lpips) = lpips {
+        let distance = protocol.mask_rule.lpips(lpips, prediction, reference, features, mask)?;
+        // Its last bits depend on the processor.
+        values.values.extend(distance.map(|distance| (Metric::LpipsAlex, round_to_steps(protocol, distance))));
+    }
+    Ok(())
+}
+
+/// Mean absolute and mean squared error of a picture of roughness or metallic over the mask, of the values as they are:
+/// they are not light and have no peak, so there is no PSNR, nor a similarity of pictures.
+pub fn measure_scalar(
+    prediction: &Picture<f32>,
+    reference: &Picture<f32>,
+    mask: &Mask,
+    values: &mut PictureValues,
+) -> Result<(), MetricError> {
+    // What counts as equal is made equal.
+    let close = Picture::from_fn(prediction.width(), prediction.height(), |x, y| {
+        let (p, t) = (prediction.get(x, y), reference.get(x, y));
+        if (p - t).abs() <= HALF_A_BYTE { t } else { p }
+    });
+    let Some(error) = mse(&close, reference, Some(mask))? else { return Ok(()) };
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for at in (0..mask.pixels().len()).filter(|&at| mask.pixels()[at]) {
+        sum += (f64::from(close.pixels()[at]) - f64::from(reference.pixels()[at])).abs();
+        count += 1;
+    }
+    values.values.extend([(Metric::Mae, sum / count as f64), (Metric::Mse, error)]);
+    Ok(())
+}
+
+/// A value rounded to the protocol's decimals.
+pub(crate) fn round_to_steps(protocol: &Protocol, value: f64) -> f64 {
+    let steps = 10_f64.powi(protocol.rounded_decimals as i32);
+    (value * steps).round() / steps
+}
+
+/// The scale of each channel that brings `prediction` nearest to `reference` in the mean square over the mask, in linear
+/// light: sum(gt * p) / sum(p * p); 1 where the denominator is 0. (Stanford-ORB's definition, applied to each picture alone.)
+pub fn channel_scales(prediction: &Picture<LinearRgb>, reference: &Picture<LinearRgb>, mask: &Mask) -> [f64; 3] {
+    let mut products = [0.0_f64; 3];
+    let mut squares = [0.0_f64; 3];
+    let pairs = prediction.pixels().iter().zip(reference.pixels()).zip(mask.pixels());
+    for ((LinearRgb(p), LinearRgb(gt)), _) in pairs.filter(|(_, counts)| **counts) {
+        for channel in 0..3 {
+            products[channel] += f64::from(gt[channel]) * f64::from(p[channel]);
+            squares[channel] += f64::from(p[channel]) * f64::from(p[channel]);
+        }
+    }
+    std::array::from_fn(|c| if squares[c] == 0.0 { 1.0 } else { products[c] / squares[c] })
+}
+
+/// The picture, each channel multiplied by its scale.
+pub fn scaled(picture: &Picture<LinearRgb>, scales: [f64; 3]) -> Picture<LinearRgb> {
+    picture.map(|LinearRgb(rgb)| LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * scales[c]) as f32)))
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::{SceneId, ViewId};
+
+    use crate::result::key::{PictureKind, PictureName, Region};
+
+    use super::*;
+
+    fn pictures() -> (Picture<LinearRgb>, Picture<LinearRgb>, Mask) {
+        let reference = Picture::from_fn(40, 30, |x, y| LinearRgb([x as f32 / 40.0, y as f32 / 30.0, 0.3]));
+        let prediction = reference.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * 0.9)));
+        (prediction, reference, Picture::from_fn(40, 30, |x, _| x >= 20))
+    }
+
+    fn blank() -> PictureValues {
+        PictureValues {
+            scene: SceneId::new("s").unwrap(),
+            view: ViewId::new("input").unwrap(),
+            picture: PictureName::whole(PictureKind::Albedo),
+            lighting: None,
+            region: Region::Valid,
+            pixels: 600,
+            values: Default::default(),
+            mse_error: None,
+            exact: false,
+            lower_bound: false,
+        }
+    }
+
+    fn albedo(
+        protocol: &str,
+        prediction: &Picture<LinearRgb>,
+        reference: &Picture<LinearRgb>,
+        mask: &Mask,
+    ) -> PictureValues {
+        let (prediction, reference) = (Albedo::new(prediction.clone()), AlbedoReference::new(reference.clone()));
+        let mut values = blank();
+        measure_albedo(&Protocol::named(protocol).unwrap(), None, &prediction, &reference, mask, true, &mut values)
+            .unwrap();
+        values
+    }
+
+    #[test]
+    fn the_protocols_differ_in_masks_and_encoding() {
+        let (prediction, reference, mask) = pictures();
+        let [ours, paper] = ["mateval-3", "paper"].map(|name| albedo(name, &prediction, &reference, &mask).values);
+        // Half of the frame is black in both pictures: the paper's SSIM is nearer to one.
+        assert!(paper[&Metric::Ssim] > ours[&Metric::Ssim] && paper[&Metric::Mse] != ours[&Metric::Mse]);
+        assert!(!ours.contains_key(&Metric::LpipsAlex) && ours[&Metric::DeltaE] > 0.0);
+    }
+
+    #[test]
+    fn truth_is_exact_and_an_empty_mask_has_no_value() {
+        let (_, reference, mask) = pictures();
+        let found = albedo("mateval-3", &reference, &reference, &mask);
+        assert!(found.exact && found.values[&Metric::Psnr] == 100.0 && found.values[&Metric::DeltaE] == 0.0);
+        assert!(albedo("mateval-3", &reference, &reference, &Picture::filled(40, 30, false)).values.is_empty());
+    }
+
+    /// A tenth off everywhere, by hand; and half a byte's step, which is nothing.
+    #[test]
+    fn scalars_are_compared_as_they_are() {
+        let reference = Picture::from_fn(40, 30, |x, y| (x as f32 + y as f32) / 100.0);
+        let mask = Picture::from_fn(40, 30, |x, _| x >= 20);
+        let measured = |by: f32| {
+            let mut values = blank();
+            measure_scalar(&reference.map(|v| v + by), &reference, &mask, &mut values).unwrap();
+            values.values
+        };
+        let found = measured(0.1);
+        assert!((found[&Metric::Mae] - 0.1).abs() < 1e-6 && (found[&Metric::Mse] - 0.01).abs() < 1e-7);
+        assert_eq!(found.len(), 2);
+        assert!(measured(128.0 / 255.0 - 0.5).values().all(|error| *error == 0.0));
+        assert!(measured(0.51 / 255.0).values().all(|error| *error > 0.0));
+    }
+
+    fn truth() -> Picture<LinearRgb> {
+        Picture::from_fn(8, 4, |x, y| LinearRgb([0.1 * x as f32, 0.2 * y as f32, 0.5]))
+    }
+
+    #[test]
+    fn undoes_a_scale_of_each_channel() {
+        let dimmed = scaled(&truth(), [0.5, 0.25, 2.0]);
+        let scales = channel_scales(&dimmed, &truth(), &Picture::filled(8, 4, true));
+        for (found, expected) in scales.into_iter().zip([2.0, 4.0, 0.5]) {
+            assert!((found - expected).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn only_the_mask_counts_and_black_stays_black() {
+        let mut dimmed = scaled(&truth(), [0.5; 3]);
+        dimmed.set(0, 0, LinearRgb([9.0; 3]));
+        let mask = Picture::from_fn(8, 4, |x, _| x > 0);
+        assert!((channel_scales(&dimmed, &truth(), &mask)[2] - 2.0).abs() < 1e-6);
+        let black = Picture::filled(8, 4, LinearRgb([0.0; 3]));
+        assert_eq!(channel_scales(&black, &truth(), &mask), [1.0; 3]);
+    }
+}

@@ -1,0 +1,305 @@
+//! One scene while it is scored: its files, opened and checked; the views, regions and submissions of the task; and the sheets
+//! on which scores are collected.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_metrics::{Lpips, MetricError};
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::{INPUT, SceneFolder, is_rendered};
+use mateval_scene::open::Dataset;
+use mateval_scene::{Progress, RendererId, SceneError, SceneId, TriangleMesh, ViewId, glb, reference_io};
+use mateval_submission::prediction::PredictedScene;
+use mateval_tracer::World;
+use serde::{Deserialize, Serialize};
+
+use crate::error::EvalError;
+use crate::light::difference::base_color_ratio;
+use crate::light::error::LightMse;
+use crate::light::lighting::{FittedRadiances, LightingName};
+use crate::light::reference::StoredReference;
+use crate::protocol::Protocol;
+use crate::result::key::{PictureKind, PictureName, Region, ResultKey, Surfaces, Views};
+use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValues};
+use crate::shown::PicturesDir;
+use crate::truth::ViewTruth;
+
+/// The views of the scene that `targets.json` names, in the scene's order; at least one.
+pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
+    let targets = &dataset.targets.targets;
+    let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
+    let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
+    if views.is_empty() {
+        return Err(EvalError::NoTargets { scene: scene.id.clone() });
+    }
+    Ok(views)
+}
+
+/// A set of views that are rendered together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ViewSet {
+    /// The input view, and those that are it turned: they share their paths.
+    Turned,
+    /// Views from other places.
+    Wide,
+}
+
+impl ViewSet {
+    /// The views of the set; empty where there are none.
+    pub(crate) fn of<'a>(self, views: &[&'a View]) -> Vec<&'a View> {
+        views.iter().filter(|view| view.id.is_wide() == (self == Self::Wide)).copied().collect()
+    }
+
+    /// The name of a pass over the set, part of its seeds.
+    pub(crate) fn pass(self, name: &str) -> String {
+        match self {
+            Self::Turned => name.to_owned(),
+            Self::Wide => format!("{name}_wide"),
+        }
+    }
+}
+
+/// A scene, opened for scoring.
+pub struct OpenScene {
+    pub folder: SceneFolder,
+    /// Its true geometry, materials and lights, ready for ray tracing.
+    pub world: World,
+    /// The meshes of `instances.glb`, one for each surface of the world.
+    pub atlases: Vec<TriangleMesh>,
+}
+
+impl OpenScene {
+    /// Fails if a file differs from the dataset's manifest or does not fit the others: numbers carry the dataset's
+    /// fingerprint, so they must come from the files that it covers. Renders are not checked; `check_photos` does that for
+    /// those of the photo's renderer, and references are checked when they are opened.
+    pub fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Self, EvalError> {
+        // The input picture is a copy of a photo renderer's, which may have been renewed since.
+        let is_needed = |file: &str| !is_rendered(file) && !file.starts_with("views/input/rgb.");
+        dataset.check_files(&scene.id, is_needed)?;
+        let folder = dataset.folder(&scene.id);
+        let world = World::new(Arc::new(reference_io::read(&folder)?))?;
+        let atlases = read_atlases(&folder, scene, &world)?;
+        Ok(Self { folder, world, atlases })
+    }
+}
+
+/// Fails if a picture with which fitted light is compared differs from the dataset's manifest.
+pub(crate) fn check_photos(dataset: &Dataset, scene: &SceneFile, renderer: &RendererId) -> Result<(), EvalError> {
+    let folder = format!("ground_truth/renders/{renderer}/");
+    Ok(dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?)
+}
+
+/// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's
+/// surfaces, or the dataset is unsound.
+fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
+    let nodes = glb::read(&folder.instances())?;
+    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
+    let named = nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids);
+    let meshes: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
+    let surfaces = &world.scene().surfaces;
+    let fits = named
+        && meshes.len() == surfaces.len()
+        && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
+    if fits {
+        return Ok(meshes);
+    }
+    let path = folder.instances();
+    let what = "it does not fit scene.json and ground_truth/reference/geometry.glb; run `mateval prep verify`";
+    Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
+}
+
+/// Everything that is needed to score submissions on one scene.
+#[derive(Clone)]
+pub(crate) struct SceneTask<'a> {
+    /// Folder of the dataset.
+    pub(crate) dataset: &'a Path,
+    pub(crate) scene: &'a SceneFile,
+    pub(crate) folder: &'a SceneFolder,
+    pub(crate) world: &'a World,
+    pub(crate) atlases: &'a [TriangleMesh],
+    /// The views that are scored.
+    pub(crate) views: Vec<&'a View>,
+    /// The set that they are.
+    pub(crate) set: ViewSet,
+    pub(crate) predictions: &'a [PredictedScene],
+    pub(crate) protocols: &'a [Protocol],
+    pub(crate) lpips: Option<&'a Lpips>,
+    /// R. Without it, light of the scene's own emitters is not scored.
+    pub(crate) reference: Option<&'a StoredReference>,
+    /// The photo's renderer. Without it, fitted light is not scored.
+    pub(crate) renderer: Option<&'a RendererId>,
+    /// Where pictures are kept for whoever recomputes the numbers.
+    pub(crate) pictures: Option<&'a PicturesDir<'a>>,
+    pub(crate) progress: Progress<'a>,
+}
+
+/// Pictures of base colour in every view.
+pub(crate) struct BaseColors {
+    /// From the true atlases.
+    pub(crate) truth: Vec<Picture<LinearRgb>>,
+    pub(crate) predicted: Vec<Vec<Picture<LinearRgb>>>,
+}
+
+impl BaseColors {
+    /// The ratio r of a submission's base colour to the truth's, in every view.
+    pub(crate) fn ratios(&self, submission: usize) -> Vec<Picture<LinearRgb>> {
+        self.predicted[submission].iter().zip(&self.truth).map(|(p, t)| base_color_ratio(p, t)).collect()
+    }
+}
+
+/// A region of a view on some of its surfaces, with the mask of its pixels.
+pub(crate) struct MaskedRegion {
+    pub(crate) region: Region,
+    pub(crate) surfaces: Surfaces,
+    pub(crate) mask: Mask,
+}
+
+impl SceneTask<'_> {
+    /// The same task over one set of its views; none where the set is empty.
+    pub(crate) fn of(&self, set: ViewSet) -> Option<Self> {
+        let views = set.of(&self.views);
+        (!views.is_empty()).then(|| Self { views, set, ..self.clone() })
+    }
+
+    /// The true maps and masks of the views.
+    pub(crate) fn truths(&self) -> Result<Vec<ViewTruth>, EvalError> {
+        self.views.iter().map(|view| ViewTruth::read(self.folder, view)).collect()
+    }
+
+    /// The view that methods see.
+    pub(crate) fn input_view(&self) -> Result<&View, EvalError> {
+        self.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: self.scene.id.clone() })
+    }
+
+    /// Pixels of a view.
+    pub(crate) fn pixels(&self) -> u64 {
+        self.views.first().map_or(0, |view| pixels(view))
+    }
+
+    /// Pixels of all views together.
+    pub(crate) fn pixels_of_all_views(&self) -> u64 {
+        self.views.iter().map(|view| pixels(view)).sum()
+    }
+
+    /// Adds scene and view to an error of a metric.
+    pub(crate) fn locate_error<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
+        found.map_err(|source| EvalError::Metric { scene: self.scene.id.clone(), view: view.id.clone(), source })
+    }
+}
+
+fn pixels(view: &View) -> u64 {
+    u64::from(view.camera.intrinsics.width) * u64::from(view.camera.intrinsics.height)
+}
+
+/// The regions of a view over which metrics are computed: all valid pixels first.
+pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
+    let all = |region, mask: &Mask| MaskedRegion { region, surfaces: Surfaces::All, mask: mask.clone() };
+    let mut regions = vec![all(Region::Valid, &truth.valid)];
+    regions.extend(truth.unobserved.as_ref().map(|mask| all(Region::Unobserved, mask)));
+    regions.extend(truth.specular.as_ref().map(|mask| MaskedRegion {
+        region: Region::Valid,
+        surfaces: Surfaces::Specular,
+        mask: mask.clone(),
+    }));
+    regions
+}
+
+impl MaskedRegion {
+    /// Whether it holds all valid pixels of its view, so that metrics with windows are taken over it.
+    pub(crate) fn is_whole(&self) -> bool {
+        (self.region, self.surfaces) == (Region::Valid, Surfaces::All)
+    }
+
+    /// A picture over this region, without values yet.
+    pub(crate) fn values(
+        &self,
+        scene: &SceneId,
+        view: &ViewId,
+        kind: PictureKind,
+        lighting: Option<LightingName>,
+    ) -> PictureValues {
+        PictureValues {
+            scene: scene.clone(),
+            view: view.clone(),
+            picture: PictureName { kind, surfaces: self.surfaces },
+            lighting,
+            region: self.region,
+            pixels: mateval_metrics::mask::pixel_count(&self.mask),
+            values: Default::default(),
+            mse_error: None,
+            exact: false,
+            lower_bound: false,
+        }
+    }
+}
+
+/// What one submission scored in one scene under one protocol.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SceneScore {
+    pub(crate) pictures: Vec<PictureValues>,
+    pub(crate) texels: Vec<InstanceTexelErrors>,
+    pub(crate) instances: Vec<InstancePixelErrors>,
+    /// Standard errors of the scene's mean PSNRs of light, in dB.
+    pub(crate) noise: BTreeMap<ResultKey, f64>,
+    pub(crate) fit: Option<FittedRadiances>,
+    /// Number of contributions of light that were not finite and count as none.
+    pub(crate) not_finite: u64,
+}
+
+/// Scores of one submission and protocol while a scene is being scored.
+#[derive(Default)]
+pub(crate) struct ScoreSheet {
+    pub(crate) score: SceneScore,
+    pub(crate) errors: InstanceErrors,
+    /// The errors of light by the mean that they count for.
+    pub(crate) light_errors: BTreeMap<ResultKey, Vec<LightMse>>,
+}
+
+/// Sums of squared errors of a scene's pixels by picture, views and instance.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct InstanceErrors(BTreeMap<(PictureKind, Views, u16), (f64, usize)>);
+
+impl InstanceErrors {
+    /// Adds `error(k)`, a mean over channels, of every pixel k in the mask to the instance that it shows.
+    pub(crate) fn add(
+        &mut self,
+        picture: PictureKind,
+        views: Views,
+        instances: &Picture<u16>,
+        mask: &Mask,
+        error: impl Fn(usize) -> f64,
+    ) {
+        let mut sums: BTreeMap<u16, (f64, usize)> = BTreeMap::new();
+        for (pixel, instance) in instances.pixels().iter().enumerate().filter(|(pixel, _)| mask.pixels()[*pixel]) {
+            let (sum, count) = sums.entry(*instance).or_default();
+            *sum += error(pixel);
+            *count += 1;
+        }
+        for (instance, (sum, count)) in sums {
+            let all = self.0.entry((picture, views, instance)).or_default();
+            all.0 += sum;
+            all.1 += count;
+        }
+    }
+
+    /// The means, by picture, views and index. Pixels that show no instance are left out.
+    pub(crate) fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
+        let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {
+            let instance = scene.instances.iter().find(|instance| instance.index.0.get() == index)?;
+            Some(InstancePixelErrors {
+                scene: scene.id.clone(),
+                instance: instance.id.clone(),
+                category: instance.listed_category().map(str::to_owned),
+                super_category: instance.listed_super_category().map(str::to_owned),
+                picture,
+                views,
+                pixels,
+                mse: sum / pixels as f64,
+            })
+        });
+        means.collect()
+    }
+}
