@@ -1,10 +1,9 @@
 //! The one error of this crate.
 
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use mateval_scene::ids::quoted;
-use mateval_scene::{InstanceId, SceneId, ViewId};
+use mateval_scene::{SceneId, ViewId};
 
 /// Why something could not be scored or shown.
 #[derive(Debug, thiserror::Error)]
@@ -15,7 +14,6 @@ pub enum EvalError {
         /// What was tried, as in "read" or "write".
         action: &'static str,
         path: PathBuf,
-        /// What the system reported.
         source: std::io::Error,
     },
     /// Scores may only be taken from the cache, and are not there.
@@ -23,10 +21,7 @@ pub enum EvalError {
         "these scores are not in the cache:{}\nscore these scenes with the same --cache, --protocol and version first",
         missing.iter().map(|(path, scenes)| missing_line(path, scenes)).collect::<String>()
     )]
-    NotCached {
-        /// The submissions and their scenes.
-        missing: Vec<(PathBuf, Vec<SceneId>)>,
-    },
+    NotCached { missing: Vec<(PathBuf, Vec<SceneId>)> },
     /// A scene's reference under light cannot be used, or is missing.
     #[error(
         "the scorer's reference of scene '{scene}' in '{}' cannot be used: {what}; make it again: mateval prep render --only \
@@ -34,24 +29,15 @@ pub enum EvalError {
         path.display(), dataset.display(), dataset.display()
     )]
     Reference {
-        /// Folder of the dataset.
         dataset: PathBuf,
         scene: SceneId,
         /// The folder of the reference.
         path: PathBuf,
-        /// What is wrong with it.
         what: String,
     },
     /// A result states a number that does not follow from the others in it.
     #[error("'{}': at {place} it states {said}, but its own numbers give {found}; it was changed by hand", path.display())]
-    Contradiction {
-        path: PathBuf,
-        place: String,
-        /// The number in the result.
-        said: String,
-        /// The number that follows.
-        found: String,
-    },
+    Contradiction { path: PathBuf, place: String, said: String, found: String },
     /// The dataset has no renders.
     #[error("the dataset '{}' has no renders; run `mateval prep render DATASET`", dataset.display())]
     NoPhotoRenderer { dataset: PathBuf },
@@ -60,11 +46,7 @@ pub enum EvalError {
     Photographed { scene: SceneId },
     /// No protocol has the name.
     #[error("cannot score: there is no protocol '{name}'; use one of: {}", known.join(", "))]
-    UnknownProtocol {
-        name: String,
-        /// The names that exist.
-        known: &'static [&'static str],
-    },
+    UnknownProtocol { name: String, known: &'static [&'static str] },
     /// The protocol was removed.
     #[error("cannot score: protocol '{name}' was removed before any release, since {reason}; use 'mateval-3'")]
     RemovedProtocol { name: String, reason: &'static str },
@@ -73,97 +55,35 @@ pub enum EvalError {
         "cannot score: protocol '{protocol}' expects version {found} of the scorer, this is version {expected}; \
          use the protocols of this version"
     )]
-    ScorerVersion {
-        protocol: String,
-        /// The version of this scorer.
-        expected: u32,
-        found: u32,
-    },
+    ScorerVersion { protocol: String, expected: u32, found: u32 },
     /// A protocol states a constant that the code does not have.
     #[error(
         "cannot score: protocol '{protocol}' states fixed.{rule} = {found}, the code has {expected}, which no protocol can \
          change; use the protocols of this version"
     )]
-    FixedRule {
-        protocol: String,
-        rule: String,
-        /// Its value in the code, as JSON.
-        expected: String,
-        /// Its value in the protocol, as JSON.
-        found: String,
-    },
+    FixedRule { protocol: String, rule: String, expected: String, found: String },
     /// The loaded network of LPIPS is not the one whose numbers results hold.
     #[error(
         "cannot score: expected the weights of LPIPS' network '{expected}', found those of '{found}'; load '{expected}'"
     )]
-    LpipsNet {
-        /// The network that results hold numbers of.
-        expected: &'static str,
-        /// The network that was loaded.
-        found: &'static str,
-    },
+    LpipsNet { expected: &'static str, found: &'static str },
     /// A result holds LPIPS, and the weights to compute it again are missing.
     #[error("cannot verify the result: it holds LPIPS, and its weights are missing: {reason}; run: {fix}")]
-    LpipsWeights {
-        /// Why they are missing.
-        reason: String,
-        /// The command that fetches them.
-        fix: String,
+    LpipsWeights { reason: String, fix: String },
+    /// The dataset is not what its format says.
+    #[error("{place}: expected {expected}, found {found}; run `mateval prep verify`")]
+    Unsound {
+        /// The file, scene or view.
+        place: String,
+        expected: String,
+        found: String,
     },
-    /// A scene has no input view.
-    #[error("scene '{scene}': expected an input view, found none; run `mateval prep verify`")]
-    NoInputView { scene: SceneId },
-    /// `targets.json` lists no view of a scene.
-    #[error("scene '{scene}': expected a view of it in targets.json, found none; run `mateval prep verify`")]
-    NoTargets { scene: SceneId },
     /// `targets.json` lists views of a scene without its input view.
     #[error(
         "scene '{scene}': targets.json lists views without the input view, to which light is fitted; add it, or score \
          without light"
     )]
     InputNotTarget { scene: SceneId },
-    /// An atlas has a size that the format does not allow.
-    #[error(
-        "'{}': the atlas of instance '{instance}' has {found} texels a side, expected {} to {}; run `mateval prep \
-         verify`",
-        path.display(), expected.start(), expected.end()
-    )]
-    AtlasSize {
-        /// `scene.json`.
-        path: PathBuf,
-        instance: InstanceId,
-        /// The sizes that the format allows.
-        expected: RangeInclusive<usize>,
-        /// The size that `scene.json` states.
-        found: usize,
-    },
-    /// A map of the truth does not have the size of its atlas.
-    #[error(
-        "'{}': expected {expected}x{expected} texels, as scene.json states, found {}x{}; run `mateval prep verify`",
-        path.display(), found[0], found[1]
-    )]
-    TruthMapSize {
-        path: PathBuf,
-        /// Width and height of the atlas.
-        expected: usize,
-        /// Width and height of the map.
-        found: [usize; 2],
-    },
-    /// A picture of the truth does not have the size of its camera's picture.
-    #[error(
-        "view '{view}': expected pictures of {}x{} pixels, the camera's size, found {}x{}; run `mateval prep verify`",
-        expected[0], expected[1], found[0], found[1]
-    )]
-    TruthPictureSize {
-        view: ViewId,
-        /// Width and height of the camera's picture.
-        expected: [usize; 2],
-        /// Width and height of the picture.
-        found: [usize; 2],
-    },
-    /// A result could not be turned into JSON to compare it.
-    #[error("cannot compare results: {0}; please report this result")]
-    Compare(serde_json::Error),
     /// The dataset or the submission could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
@@ -185,6 +105,12 @@ pub enum EvalError {
 }
 
 impl EvalError {
+    /// The scene has no input view.
+    pub(crate) fn no_input_view(scene: &SceneId) -> Self {
+        let [expected, found] = ["an input view", "none"].map(str::to_owned);
+        Self::Unsound { place: format!("scene '{scene}'"), expected, found }
+    }
+
     /// The error of an action on a path.
     pub(crate) fn io(action: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
         let path = path.to_owned();

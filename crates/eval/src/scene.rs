@@ -32,7 +32,8 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
     let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
     let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
     if views.is_empty() {
-        return Err(EvalError::NoTargets { scene: scene.id.clone() });
+        let [expected, found] = ["a view of it in targets.json", "none"].map(str::to_owned);
+        return Err(EvalError::Unsound { place: format!("scene '{}'", scene.id), expected, found });
     }
     Ok(views)
 }
@@ -170,7 +171,7 @@ impl SceneTask<'_> {
 
     /// The view that methods see.
     pub(crate) fn input_view(&self) -> Result<&View, EvalError> {
-        self.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: self.scene.id.clone() })
+        self.scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&self.scene.id))
     }
 
     /// Pixels of a view.

@@ -2,7 +2,7 @@
 
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, Texture, Wrap, exr_io, png_io};
-use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::dataset::{Instance, SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::submission::Map;
 use mateval_scene::{InstanceId, RendererId};
@@ -89,35 +89,25 @@ pub(crate) fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), E
     let expected = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
     match sizes.iter().find(|found| **found != expected) {
         None => Ok(()),
-        Some(found) => Err(EvalError::TruthPictureSize {
-            view: view.id.clone(),
-            expected: expected.into(),
-            found: (*found).into(),
+        Some(found) => Err(EvalError::Unsound {
+            place: format!("view '{}'", view.id),
+            expected: format!("pictures of {}x{} pixels, the camera's size", expected.0, expected.1),
+            found: format!("{}x{}", found.0, found.1),
         }),
     }
 }
 
-/// A material's three maps as the dataset holds them: its source baked to the instance's atlas.
-#[derive(Clone, Debug)]
-pub struct TruthMaterial {
-    /// Linear at lookup.
-    pub base_color: Texture,
-    /// Perceptual, 0 to 1.
-    pub roughness: Texture,
-    /// 0 to 1.
-    pub metallic: Texture,
-}
-
-impl TruthMaterial {
-    /// Reads `ground_truth/materials/<instance>/`, each map a PNG of `size` times `size` texels.
-    ///
-    /// Fails where a file is missing, unsound or of another size.
-    pub fn read(folder: &SceneFolder, instance: &InstanceId, size: usize) -> Result<Self, EvalError> {
-        let read = |map: Map| read_truth(folder, instance, map, size);
-        let ((base_color, roughness), metallic) =
-            rayon::join(|| rayon::join(|| read(Map::BaseColor), || read(Map::Roughness)), || read(Map::Metallic));
-        Ok(Self { base_color: base_color?, roughness: roughness?, metallic: metallic? })
-    }
+/// The true maps of an instance: its source's material baked to its atlas of `size` times `size` texels, with the texels that a
+/// submission of the same files would have.
+///
+/// Fails where a file of `ground_truth/materials/<instance>/` is missing, unsound or of another size.
+pub fn true_material(folder: &SceneFolder, instance: &InstanceId, size: usize) -> Result<PredictedMaterial, EvalError> {
+    let read = |map: Map| read_truth(folder, instance, map, size);
+    // A submission's constant scalar is one float.
+    let compact = |map: Texture| if map.width() == 1 { one_texel(map.texel(0, 0)[0]) } else { map };
+    let ((base_color, roughness), metallic) =
+        rayon::join(|| rayon::join(|| read(Map::BaseColor), || read(Map::Roughness)), || read(Map::Metallic));
+    Ok(PredictedMaterial { base_color: base_color?, roughness: compact(roughness?), metallic: compact(metallic?) })
 }
 
 fn read_truth(folder: &SceneFolder, instance: &InstanceId, map: Map, size: usize) -> Result<Texture, EvalError> {
@@ -127,24 +117,20 @@ fn read_truth(folder: &SceneFolder, instance: &InstanceId, map: Map, size: usize
     if (texture.width(), texture.height()) == (size, size) {
         return Ok(texture.collapsed());
     }
-    Err(EvalError::TruthMapSize { path: png, expected: size, found: [texture.width(), texture.height()] })
+    Err(EvalError::Unsound {
+        place: format!("'{}'", png.display()),
+        expected: format!("{size}x{size} texels, as scene.json states"),
+        found: format!("{}x{}", texture.width(), texture.height()),
+    })
 }
 
-/// All true maps of a scene, with the texels that a submission of the same files would have.
+/// All true maps of a scene.
 pub(crate) fn true_maps(folder: &SceneFolder, scene: &SceneFile) -> Result<PredictedScene, EvalError> {
-    // A submission's constant scalar is one float.
-    let compact = |map: Texture| if map.width() == 1 { one_texel(map.texel(0, 0)[0]) } else { map };
-    let mut materials = Vec::new();
-    for instance in &scene.instances {
-        materials.push(match &instance.atlas {
-            None => None,
-            Some(atlas) => {
-                let TruthMaterial { base_color, roughness, metallic } =
-                    TruthMaterial::read(folder, &instance.id, atlas.size as usize)?;
-                Some(PredictedMaterial { base_color, roughness: compact(roughness), metallic: compact(metallic) })
-            }
-        });
-    }
+    let of = |instance: &Instance| {
+        let atlas = instance.atlas.as_ref();
+        atlas.map(|atlas| true_material(folder, &instance.id, atlas.size as usize)).transpose()
+    };
+    let materials = scene.instances.iter().map(of).collect::<Result<Vec<_>, _>>()?;
     let scattering_key = scattering_key(&materials);
     Ok(PredictedScene { materials, scattering_key, findings: Vec::new(), files: Vec::new() })
 }

@@ -89,7 +89,7 @@ pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<Verificati
     let mut again = scored_again(plan, &result, progress)?;
     // The verdict lies outside the dataset's identity and may have been made or changed since.
     again.tracer_check.clone_from(&result.tracer_check);
-    let found = differences(&to_value(&result)?, &to_value(&again)?);
+    let found = differences(&to_value(&result), &to_value(&again));
     let findings = found.iter().take(MOST_LISTED).map(|difference| finding(&name, difference)).collect();
     Ok(VerificationFile { confirmed: found.is_empty(), differences: found.len(), findings, ..verification })
 }
@@ -120,8 +120,8 @@ fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
     }
 }
 
-fn to_value(result: &ResultFile) -> Result<serde_json::Value, EvalError> {
-    serde_json::to_value(result).map_err(EvalError::Compare)
+fn to_value(value: impl Serialize) -> Value {
+    serde_json::to_value(value).expect("our types can be written as JSON")
 }
 
 fn finding(file: &str, difference: &Difference) -> Finding {
@@ -148,7 +148,7 @@ fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>,
         action: action.to_owned(),
     };
     let mut findings = Vec::new();
-    findings.extend(rules(result, &finding)?);
+    findings.extend(rules(result, &finding));
     let (said, found) = (&result.dataset.manifest_sha256, &plan.dataset.file.manifest_sha256);
     if said != found {
         let message = format!("made on a dataset with manifest {said}; this one's is {found}");
@@ -172,7 +172,7 @@ fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>,
 
 type MakeFinding<'a> = dyn Fn(&str, &str, String, &str) -> Finding + 'a;
 
-fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>, EvalError> {
+fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, scores) in &result.protocols {
         let place = format!("/protocols/{name}/protocol");
@@ -181,16 +181,13 @@ fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>,
             findings.push(finding("other_protocol", &place, message, "verify it with the version that made it"));
             continue;
         };
-        let values =
-            [&scores.protocol, &known].map(|protocol| serde_json::to_value(protocol).map_err(EvalError::Compare));
-        let [said, known] = values;
-        for difference in differences(&said?, &known?) {
+        for difference in differences(&to_value(&scores.protocol), &to_value(&known)) {
             let message = format!("the result states {}; protocol '{name}' has {}", difference.said, difference.found);
             let place = format!("{place}{}", difference.place);
             findings.push(finding("other_protocol", &place, message, "score it again by the published rules"));
         }
     }
-    Ok(findings)
+    findings
 }
 
 fn weights(
@@ -217,7 +214,7 @@ impl ResultFile {
     /// mean that is not that of its own numbers.
     pub fn read(path: &Path) -> Result<Self, EvalError> {
         let result: Self = json::read_format(path, RESULT_FORMAT)?;
-        match result.contradiction()? {
+        match result.contradiction() {
             None => Ok(result),
             Some(Difference { place, said, found }) => {
                 Err(EvalError::Contradiction { path: path.to_owned(), place, said, found })
@@ -226,20 +223,19 @@ impl ResultFile {
     }
 
     /// The first mean that does not follow from the numbers below it: pictures to scenes, scenes to the summary.
-    fn contradiction(&self) -> Result<Option<Difference>, EvalError> {
+    fn contradiction(&self) -> Option<Difference> {
         for (name, scores) in &self.protocols {
             let (scenes, summary) = means(&scores.pictures, &scores.texels);
             let noise = summary_noise(&scores.noise, &scenes);
-            let value = |value: serde_json::Result<serde_json::Value>| value.map_err(EvalError::Compare);
-            let said = value(serde_json::to_value((&scores.scenes, &scores.summary, &scores.summary_noise)))?;
-            let found = value(serde_json::to_value((&scenes, &summary, &noise)))?;
+            let said = to_value((&scores.scenes, &scores.summary, &scores.summary_noise));
+            let found = to_value((&scenes, &summary, &noise));
             if let Some(first) = differences(&said, &found).into_iter().next() {
                 let (at, rest) = first.place[1..].split_at(1);
                 let part = ["scenes", "summary", "summary_noise"][at.parse::<usize>().unwrap_or(0)];
-                return Ok(Some(Difference { place: format!("/protocols/{name}/{part}{rest}"), ..first }));
+                return Some(Difference { place: format!("/protocols/{name}/{part}{rest}"), ..first });
             }
         }
-        Ok(None)
+        None
     }
 }
 

@@ -4,17 +4,17 @@
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, MetricError, Psnr, delta_e, mse};
 use mateval_scene::Report;
-use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::dataset::View;
 use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::mask_rule::ReferenceFeatures;
 use crate::materials::pictures::{MaterialPictures, material_pictures};
-use crate::materials::texels::{InstanceTexels, TexelSums, texture_space};
+use crate::materials::texels::texture_space;
 use crate::protocol::{AlbedoSpace, Protocol};
+use crate::result::PictureValues;
 use crate::result::key::{HALF_A_BYTE, Metric, PictureKind, Region, Surfaces, Views};
-use crate::result::{InstanceTexelErrors, PictureValues, TexelErrors};
 use crate::scene::{BaseColors, InstanceErrors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::{ViewTruth, true_maps};
 
@@ -178,9 +178,7 @@ impl SceneTask<'_> {
             self.pictures,
             self.progress,
         )?;
-        for (sheets, instances) in sheets.iter_mut().zip(found) {
-            let errors: Vec<InstanceTexelErrors> =
-                instances.iter().map(|instance| texel_errors(self.scene, instance)).collect();
+        for (sheets, errors) in sheets.iter_mut().zip(found) {
             for sheet in sheets {
                 sheet.score.texels = errors.clone();
             }
@@ -191,16 +189,6 @@ impl SceneTask<'_> {
 
 fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
-}
-
-fn texel_errors(scene: &SceneFile, instance: &InstanceTexels) -> InstanceTexelErrors {
-    let errors = |sums: &TexelSums| TexelErrors { area_m2: sums.area_m2, base_color_mse: sums.mse() };
-    InstanceTexelErrors {
-        scene: scene.id.clone(),
-        instance: instance.instance.clone(),
-        observed: errors(&instance.observed),
-        unobserved: errors(&instance.unobserved),
-    }
 }
 
 /// An albedo picture, linear and as SSIM and LPIPS see it.

@@ -2,8 +2,7 @@
 //!
 //! Every texel counts, whether or not a view shows it.
 //!
-//! In: the baked truth of an instance, the maps of every submission. Out: an [`InstanceTexels`] for each submission, whose
-//! sums add up to the errors of a scene or a category.
+//! In: the baked truth of an instance, the maps of every submission. Out: [`InstanceTexelErrors`] for each submission.
 //!
 //! A [`TexelMap`], shared by all submissions, holds where each texel of the truth's atlas lies, how large it is and whether
 //! the input camera sees it. One instance is in memory at a time.
@@ -16,45 +15,37 @@ use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::MAP_SIZES;
-use mateval_scene::{InstanceId, Progress, Report, TriangleMesh};
+use mateval_scene::{Progress, Report, TriangleMesh};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
 use mateval_tracer::World;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
+use crate::result::{InstanceTexelErrors, TexelErrors};
 use crate::shown::PicturesDir;
-use crate::truth::TruthMaterial;
+use crate::truth::true_material;
 
 /// Weighted squared errors over the observed, or the unobserved, texels of one or several instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TexelSums {
+struct TexelSums {
     /// The sum of the weights: the texels' area on the surface, in square metres.
-    pub area_m2: f64,
+    area_m2: f64,
     /// Squared error of the base colour, linear, mean over its channels, times the weight.
-    pub base_color: f64,
+    base_color: f64,
 }
 
 impl TexelSums {
     /// Adds other sums. The order of additions determines the last bits.
-    pub fn add(&mut self, other: &Self) {
+    fn add(&mut self, other: &Self) {
         self.area_m2 += other.area_m2;
         self.base_color += other.base_color;
     }
 
-    /// The mean squared error over the area; none where the area is zero.
-    pub fn mse(&self) -> Option<f64> {
-        (self.area_m2 > 0.0).then(|| self.base_color / self.area_m2)
+    fn errors(&self) -> TexelErrors {
+        let base_color_mse = (self.area_m2 > 0.0).then(|| self.base_color / self.area_m2);
+        TexelErrors { area_m2: self.area_m2, base_color_mse }
     }
-}
-
-/// The errors of a submission on one instance, over all texels on its surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct InstanceTexels {
-    pub instance: InstanceId,
-    /// Texels that the input camera sees.
-    pub observed: TexelSums,
-    pub unobserved: TexelSums,
 }
 
 /// Compares every instance that has an atlas, in the scene's order. Returns a list for each submission, in their order.
@@ -69,15 +60,15 @@ pub fn texture_space(
     submissions: &[PredictedScene],
     pictures: Option<&PicturesDir<'_>>,
     progress: Progress<'_>,
-) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
-    let input = scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene.id.clone() })?;
+) -> Result<Vec<Vec<InstanceTexelErrors>>, EvalError> {
+    let input = scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&scene.id))?;
     let mut compared = vec![Vec::new(); submissions.len()];
     for (at, instance) in scene.instances.iter().enumerate() {
         let Some(size) = atlas_size(folder, instance)? else { continue };
         progress(Report::step(&format!("texels of {}", scene.id), at, scene.instances.len()));
         let (map, truth) = rayon::join(
             || TexelMap::new(world, SurfaceIndex(at), &atlases[at], size, &input.camera),
-            || TruthMaterial::read(folder, &instance.id, size),
+            || true_material(folder, &instance.id, size),
         );
         let truth = truth?;
         for (number, (list, submission)) in compared.iter_mut().zip(submissions).enumerate() {
@@ -87,7 +78,12 @@ pub fn texture_space(
                 write_texels(&path, &map, &prediction.base_color, &truth.base_color)?;
             }
             let [observed, unobserved] = compare(&map, prediction, &truth);
-            list.push(InstanceTexels { instance: instance.id.clone(), observed, unobserved });
+            list.push(InstanceTexelErrors {
+                scene: scene.id.clone(),
+                instance: instance.id.clone(),
+                observed: observed.errors(),
+                unobserved: unobserved.errors(),
+            });
         }
     }
     Ok(compared)
@@ -100,15 +96,18 @@ fn atlas_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>
     if MAP_SIZES.contains(&size) {
         return Ok(Some(size));
     }
-    let (path, instance) = (folder.scene_file(), instance.id.clone());
-    Err(EvalError::AtlasSize { path, instance, expected: MAP_SIZES, found: size })
+    Err(EvalError::Unsound {
+        place: format!("'{}': instance '{}'", folder.scene_file().display(), instance.id),
+        expected: format!("an atlas of {} to {} texels a side", MAP_SIZES.start(), MAP_SIZES.end()),
+        found: size.to_string(),
+    })
 }
 
 /// The squared errors of a prediction, weighted by area: of observed texels, then of unobserved ones.
 ///
 /// Both are looked up at the texels' places, bilinearly, whatever the prediction's size: at a centre the truth is its texel
 /// itself. Both are linear; nothing is clipped. The sums are the same for any number of threads.
-pub fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMaterial) -> [TexelSums; 2] {
+fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &PredictedMaterial) -> [TexelSums; 2] {
     let rows: Vec<[TexelSums; 2]> =
         (0..map.size()).into_par_iter().map(|y| compare_row(map, prediction, truth, y)).collect();
     let mut sums = [TexelSums::default(); 2];
@@ -118,7 +117,7 @@ pub fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMate
     sums
 }
 
-fn compare_row(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMaterial, y: usize) -> [TexelSums; 2] {
+fn compare_row(map: &TexelMap, prediction: &PredictedMaterial, truth: &PredictedMaterial, y: usize) -> [TexelSums; 2] {
     let mut sums = [TexelSums::default(); 2];
     for texel in map.row(y) {
         let of_channels = |prediction: &Texture, truth: &Texture| {
@@ -174,7 +173,7 @@ mod tests {
     use mateval_image::{Picture, Texels, Wrap, png_io};
     use mateval_scene::material::{ColorInput, Material, MaterialModel};
     use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-    use mateval_scene::{Camera, Intrinsics, SceneId};
+    use mateval_scene::{Camera, InstanceId, Intrinsics, SceneId};
     use mateval_submission::atlas_meshes::AtlasMeshes;
     use mateval_submission::prediction::read_scene;
     use serde_json::json;
@@ -219,14 +218,9 @@ mod tests {
         Texture::new(size, size, texels, Wrap::Clamp).unwrap()
     }
 
-    fn truth(size: usize) -> TruthMaterial {
+    fn truth(size: usize) -> PredictedMaterial {
         let base_color = greys(size, |x, y| ((7 * x + 13 * y) % 31) as f32 / 31.0);
         let [roughness, metallic] = [5, 11].map(|step| greys(size, |x, y| ((step * x + y) % 17) as f32 / 17.0));
-        TruthMaterial { base_color, roughness, metallic }
-    }
-
-    fn predicted(truth: &TruthMaterial) -> PredictedMaterial {
-        let TruthMaterial { base_color, roughness, metallic } = truth.clone();
         PredictedMaterial { base_color, roughness, metallic }
     }
 
@@ -235,10 +229,10 @@ mod tests {
     fn truth_is_exact() {
         for size in [64, 100, 129] {
             let (map, truth) = (map([1.0, 3.0], size), truth(size));
-            let [observed, unobserved] = compare(&map, &predicted(&truth), &truth);
+            let [observed, unobserved] = compare(&map, &truth, &truth);
             assert!(observed.area_m2 > 3.0 && unobserved == TexelSums::default());
-            assert_eq!((observed.mse(), unobserved.mse()), (Some(0.0), None));
-            let moved = PredictedMaterial { base_color: greys(size, |x, _| x as f32), ..predicted(&truth) };
+            assert_eq!((observed.errors().base_color_mse, unobserved.errors().base_color_mse), (Some(0.0), None));
+            let moved = PredictedMaterial { base_color: greys(size, |x, _| x as f32), ..truth.clone() };
             assert!(compare(&map, &moved, &truth)[0].base_color > 0.0);
         }
     }
@@ -247,12 +241,12 @@ mod tests {
     #[test]
     fn half_of_the_area_wrong() {
         let [grey, white] = [0.5, 1.0].map(|value| greys(1, |_, _| value));
-        let truth = TruthMaterial { base_color: grey.clone(), roughness: grey, metallic: white };
+        let truth = PredictedMaterial { base_color: grey.clone(), roughness: grey, metallic: white };
         for size in [64, 256, 320] {
             let half_wrong = greys(size, |x, _| if x < size * 15 / 32 { 0.5 } else { 0.75 });
-            let prediction = PredictedMaterial { base_color: half_wrong, ..predicted(&truth) };
+            let prediction = PredictedMaterial { base_color: half_wrong, ..truth.clone() };
             let [observed, _] = compare(&map([2.0, 2.0], 64), &prediction, &truth);
-            let found = observed.mse().unwrap();
+            let found = observed.errors().base_color_mse.unwrap();
             assert!((found - 1.0 / 32.0).abs() < 1e-8, "{size}: {found}");
         }
     }
@@ -262,13 +256,13 @@ mod tests {
     #[test]
     fn area_is_what_counts() {
         let zero = greys(1, |_, _| 0.0);
-        let truth = TruthMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
+        let truth = PredictedMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
         let wrong = greys(64, |x, _| if x < 30 { 0.0 } else { 0.2 });
-        let prediction = PredictedMaterial { base_color: wrong, ..predicted(&truth) };
+        let prediction = PredictedMaterial { base_color: wrong, ..truth.clone() };
         let map = map([1.0, 3.0], 64);
         let [observed, _] = compare(&map, &prediction, &truth);
         let square = f64::from(0.2_f32).powi(2);
-        assert!((observed.mse().unwrap() / square - 0.75).abs() < 1e-6);
+        assert!((observed.errors().base_color_mse.unwrap() / square - 0.75).abs() < 1e-6);
         let texels: Vec<SurfaceTexel> = (0..64).flat_map(|y| map.row(y)).collect();
         let wrong_texels = texels.iter().filter(|texel| texel.column >= 30).count();
         assert_eq!(2 * wrong_texels, texels.len());
@@ -279,10 +273,10 @@ mod tests {
     fn colours_are_the_mean_over_channels_and_as_they_are() {
         let color = |rgb: [f32; 3]| Texture::new(1, 1, Texels::Linear(vec![rgb]), Wrap::Clamp).unwrap();
         let zero = greys(1, |_, _| 0.0);
-        let truth = TruthMaterial { base_color: color([1.0, 0.5, 0.0]), roughness: zero.clone(), metallic: zero };
-        let prediction = PredictedMaterial { base_color: color([1.3, 0.5, 0.0]), ..predicted(&truth) };
+        let truth = PredictedMaterial { base_color: color([1.0, 0.5, 0.0]), roughness: zero.clone(), metallic: zero };
+        let prediction = PredictedMaterial { base_color: color([1.3, 0.5, 0.0]), ..truth.clone() };
         let [observed, _] = compare(&map([1.0, 1.0], 64), &prediction, &truth);
-        assert!((observed.mse().unwrap() - 0.03).abs() < 1e-7);
+        assert!((observed.errors().base_color_mse.unwrap() - 0.03).abs() < 1e-7);
     }
 
     #[test]
@@ -290,7 +284,7 @@ mod tests {
         let sums = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let wrong = truth(128);
-            pool.install(|| compare(&map([1.0, 3.0], 100), &predicted(&wrong), &truth(100)))
+            pool.install(|| compare(&map([1.0, 3.0], 100), &wrong, &truth(100)))
         };
         let one = sums(1);
         assert!(one[0].base_color > 0.0);
@@ -308,11 +302,11 @@ mod tests {
         }
         let map = TexelMap::new(&world(&thin), SurfaceIndex(0), &thin, 64, &camera());
         let zero = greys(1, |_, _| 0.0);
-        let truth = TruthMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
+        let truth = PredictedMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
         let wrong = greys(64, |_, y| if y >= 32 { 0.0 } else { 0.5 });
-        let [observed, _] = compare(&map, &PredictedMaterial { base_color: wrong, ..predicted(&truth) }, &truth);
+        let [observed, _] = compare(&map, &PredictedMaterial { base_color: wrong, ..truth.clone() }, &truth);
         assert!((observed.area_m2 - 4.0).abs() < 1e-5, "{}", observed.area_m2);
-        assert!((observed.mse().unwrap() - 0.75 * 0.25).abs() < 1e-6);
+        assert!((observed.errors().base_color_mse.unwrap() - 0.75 * 0.25).abs() < 1e-6);
     }
 
     /// A dataset's scene of one instance of 64 texels a side, and a submission of its truth.
@@ -345,7 +339,7 @@ mod tests {
         folder: &SceneFolder,
         scene: &SceneFile,
         submission: &std::path::Path,
-    ) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
+    ) -> Result<Vec<Vec<InstanceTexelErrors>>, EvalError> {
         let mesh = mesh([1.0, 1.0]);
         let meshes = [mesh];
         let atlases = AtlasMeshes::in_memory(&meshes);
@@ -359,9 +353,9 @@ mod tests {
         let (root, folder, scene) = on_disk();
         let both = compared(&folder, &scene, &root.path().join("submission")).unwrap();
         let [[same], [nothing]] = [both[0].as_slice(), both[1].as_slice()] else { panic!("{both:?}") };
-        assert_eq!(same.observed.mse(), Some(0.0));
-        assert_eq!((same.observed.area_m2, same.unobserved), (nothing.observed.area_m2, TexelSums::default()));
-        assert!(nothing.observed.mse().unwrap() > 0.01);
+        assert_eq!(same.observed.base_color_mse, Some(0.0));
+        assert_eq!((same.observed.area_m2, same.unobserved), (nothing.observed.area_m2, TexelErrors::default()));
+        assert!(nothing.observed.base_color_mse.unwrap() > 0.01);
     }
 
     #[test]
@@ -377,7 +371,7 @@ mod tests {
         assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("roughness.png"));
         scene.instances[0].atlas.as_mut().unwrap().size = 1 << 20;
         let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
-        assert!(text.contains("the atlas of instance 'a' has 1048576 texels a side"), "{text}");
+        assert!(text.contains("instance 'a': expected an atlas of 64 to 4096 texels a side, found 1048576"), "{text}");
         scene.views.clear();
         assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("expected an input view"));
     }

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
 use mateval_eval::EvalError;
-use mateval_eval::light::blocks::noise_blocks;
+use mateval_eval::light::error::noise_blocks;
 use mateval_eval::light::lighting::lightings;
-use mateval_eval::light::rules::Track;
-use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::protocol::Track;
 use mateval_eval::result::ProtocolResult;
+use mateval_eval::result::key::Metric;
 use mateval_eval::score::{ScorePlan, score};
 use mateval_light::light_stage;
 use mateval_scene::Camera;

@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result_key::ResultKey;
+use mateval_eval::result::key::Metric;
+use mateval_eval::result::key::ResultKey;
 use mateval_image::LinearRgb;
 use mateval_testkit::kept_folder::kept_folder;
 
