@@ -1,17 +1,17 @@
 """Computes every number of a result again from pictures, without MatEval's code.
 
 Usage: `recompute.py DATASET PICTURES RESULT [WEIGHTS]`, where PICTURES was written by `mateval eval score --pictures` for
-the one submission of RESULT. Needs NumPy, SciPy, OpenEXR, Pillow and scikit-image; FLIP is compared where flip-evaluator is
-installed, LPIPS where lpips and torch are and WEIGHTS names the file of weights. Prints the largest differences and ends
-with 1 if one is above its bound. PROTOCOL.md describes each step.
+the one submission of RESULT. Needs what requirements.txt lists; LPIPS is compared where WEIGHTS names the file of weights,
+which needs lpips, torch and safetensors too. Prints the largest differences and ends with 1 if one is above its bound.
+PROTOCOL.md describes each step.
 """
 
 import collections
 import json
-import os
 import pathlib
 import sys
 
+import flip_evaluator
 import numpy as np
 import OpenEXR
 from PIL import Image
@@ -68,24 +68,16 @@ class Similarity:
     """SSIM, LPIPS and FLIP of two encoded pictures over a mask."""
 
     def __init__(self, weights):
-        self.lpips = self.flip = None
-        try:
-            import flip_evaluator
+        self.lpips = None
+        if weights is None:
+            print("LPIPS is not compared, since no weights were named")
+            return
+        import lpips
+        import torch
+        from safetensors.torch import load_file
 
-            self.flip = flip_evaluator
-        except ImportError:
-            print("FLIP is not compared: flip-evaluator is not installed")
-        try:
-            import lpips
-            import torch
-            from safetensors.torch import load_file
-
-            self.torch, self.lpips = torch, lpips.LPIPS(net="alex", spatial=True, pretrained=False, pnet_rand=True, verbose=False)
-            state = {name: value for name, value in load_file(weights).items()}
-            self.load(state)
-        except (ImportError, TypeError, FileNotFoundError) as error:
-            self.lpips = None
-            print(f"LPIPS is not compared: {error}")
+        self.torch, self.lpips = torch, lpips.LPIPS(net="alex", spatial=True, pretrained=False, pnet_rand=True, verbose=False)
+        self.load(dict(load_file(weights).items()))
 
     def load(self, state):
         own = self.lpips.state_dict()
@@ -111,9 +103,9 @@ class Similarity:
             tensor = lambda picture: self.torch.tensor(picture.transpose(2, 0, 1)[None] * 2 - 1, dtype=self.torch.float32)
             with self.torch.no_grad():
                 found["lpips_alex"] = float(self.lpips(tensor(filled), tensor(reference))[0, 0].numpy()[mask].mean())
-        if with_flip and self.flip is not None:
+        if with_flip:
             pair = [np.ascontiguousarray(picture, dtype=np.float32) for picture in (reference, filled)]
-            found["flip"] = float(np.asarray(self.flip.evaluate(*pair, "LDR", applyMagma=False)[0]).squeeze()[mask].mean())
+            found["flip"] = float(np.asarray(flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)[0]).squeeze()[mask].mean())
         return found
 
 
@@ -255,10 +247,8 @@ def main(dataset, pictures, result, weights=None):
     dataset, pictures = pathlib.Path(dataset), pathlib.Path(pictures)
     result = json.loads(pathlib.Path(result).read_text())
     scores, similarity = result["protocols"]["mateval-3"], Similarity(weights)
-    skipped = [word for word, tool in (("lpips_alex", similarity.lpips), ("flip", similarity.flip)) if tool is None]
+    skipped = ["lpips_alex"] if similarity.lpips is None else []
     wrong, compared, worst = [], 0, {}
-    if skipped and os.environ.get("MATEVAL_REQUIRE_DATA") == "1":
-        wrong.append(f"{' and '.join(skipped)} cannot be compared, and MATEVAL_REQUIRE_DATA=1 requires it")
 
     def compare(place, stated, found):
         nonlocal compared

@@ -133,7 +133,7 @@ impl Protocol {
 pub enum Track {
     /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT) or the scene's own emitters (Bitterli).
     Fitted,
-    /// The reference's own emitters.
+    /// The scene's own emitters.
     True,
     /// The same emitters with weights that no method has seen.
     Relit,

@@ -9,12 +9,15 @@
 //! b   = min(r, 1),   g = min(r, 2)
 //! m_i = b R + (q_i - b t_i);   m_h = the mean of its quarters
 //! F_o = filter(m_o - g R), by the noise of its quarters
-//! k_o = sum clip(m_o, 0, 1) / sum clip(r R, 0, 1) over the valid pixels and channels of the view, within 0.1 to 10
+//! k_o = sum clip(m_o, 0, 1) / sum clip(r R, 0, 1), each value clipped, over the valid pixels and channels, within 0.1 to 10
 //! p_h = g R + F_o, limited to k_o r R / 2 ... 2 k_o r R
 //! s_h = f'(clip(p_h, 0.002, 1)), 0 where p_h >= 1;   p'_h = clip(p_h, 0, 1)
 //! X_h = f(p'_h) + s_h (m_h - p'_h) - f(R);   u_h = s_h times half the difference of the quarters
 //! ```
 //!
+//! r R is what the prediction would show if light between surfaces did not change; b is r where that takes away more noise than
+//! it brings in (a factor above 1 would enlarge the truth's noise), and g R the part of r R that the filter need not carry, bounded
+//! because r is large only where the truth is dark and R's own noise would be enlarged with it.
 //! f clips above 1 and encodes to sRGB, f' is its slope. Encoding is a curve, so the mean of encoded noise is not the encoded
 //! mean. Here the curve is replaced by its tangent at a pivot p that half h does not know: X_h is linear in m_h, and its mean
 //! is the encoded mean as far as the pivot is right. m_i is a control variate (Owen, "Monte Carlo theory, methods and

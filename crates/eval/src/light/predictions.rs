@@ -95,10 +95,10 @@ pub(super) fn score_own(
         let repaint = paths.repaint(&predictions, Some(&truth))?;
         let mixes = vec![mixes.clone(); repaint.predictions()];
         let ratios: Vec<Vec<Picture<LinearRgb>>> = batch.iter().map(|&index| base_colors.ratios(index)).collect();
-        // The truth travels last.
-        let corrected = |renders: &[ViewsRender], at: usize, picture: usize, view: usize| {
-            let [own, truth] = [at, batch.len()].map(|at| picture_of(&renders[at], view, picture));
-            let (reference, ratio) = (&lightings[picture].references[view], &ratios[at][view]);
+        let corrected = |renders: &[ViewsRender], prediction: usize, lighting: usize, view: usize| {
+            // The truth travels last.
+            let [own, truth] = [prediction, batch.len()].map(|at| picture_of(&renders[at], view, lighting));
+            let (reference, ratio) = (&lightings[lighting].references[view], &ratios[prediction][view]);
             corrected_quarter(own, truth, task.scene.exposure, reference, ratio)
         };
         let (mut quarters, mut not_finite) =
@@ -202,8 +202,9 @@ impl Paths<'_> {
         Ok(render_repainted(self.world, repaint, which, cameras, lighting, &settings, &seeds, &shown)?)
     }
 
-    /// The quarters of the first `predictions` that travel, by prediction, picture of its `mixes` and view, and the number of
-    /// contributions of each that were not finite. `picture` makes the picture of (prediction, picture, view) from a stream.
+    /// The quarters of the first `predictions` that travel, by prediction, light mix and view, and the number of contributions of
+    /// each that were not finite. Each half has `samples` per pixel, so a quarter has half of them. `picture` makes the picture
+    /// of (prediction, mix, view) from one stream's renders of everything that travels.
     pub(crate) fn quarters(
         &self,
         repaint: &Repaint,
@@ -217,11 +218,11 @@ impl Paths<'_> {
         let mut not_finite = vec![0; predictions];
         for stream in QUARTERS {
             let renders = self.trace(repaint, Lighting::Mixed(mixes), cameras, (samples / 2).max(1), stream)?;
-            for (at, pictures) in quarters.iter_mut().enumerate() {
-                not_finite[at] += renders[at].stats.not_finite;
-                for (which, views) in pictures.iter_mut().enumerate() {
+            for (prediction, mixes) in quarters.iter_mut().enumerate() {
+                not_finite[prediction] += renders[prediction].stats.not_finite;
+                for (mix, views) in mixes.iter_mut().enumerate() {
                     let views = views.par_iter_mut().enumerate();
-                    views.for_each(|(view, quarters)| quarters.push(picture(&renders, at, which, view)));
+                    views.for_each(|(view, quarters)| quarters.push(picture(&renders, prediction, mix, view)));
                 }
             }
         }
@@ -275,7 +276,7 @@ pub(crate) fn batches(predictions: &[PredictedScene], others: usize, bytes: u64)
     alike.into_values().flat_map(|alike| alike.chunks(most).map(<[usize]>::to_vec).collect::<Vec<_>>()).collect()
 }
 
-/// A picture of one view of a render of one seed.
+/// A picture of one view. Every stream has one seed, so the tracer's list of halves holds one.
 pub(crate) fn picture_of(render: &ViewsRender, view: usize, picture: usize) -> &Picture<LinearRgb> {
     &render.views[view].halves[0].basis.pictures()[picture]
 }

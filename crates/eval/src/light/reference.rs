@@ -99,6 +99,7 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
         variance: BTreeMap::new(),
         files: BTreeMap::new(),
     };
+    // The only protocol that compares with R.
     let rules = Protocol::named("mateval-3")?.light;
     let views: Vec<&View> = scene.views.iter().collect();
     for set in [ViewSet::Turned, ViewSet::Wide] {
@@ -249,7 +250,15 @@ impl StoredReference {
         let read = |group: usize| -> Result<Picture<LinearRgb>, EvalError> {
             let picture = exr_io::read_linear(&self.folder.join(view.id.as_str()).join(group_file(group)))?;
             check_sizes(view, &[(picture.width(), picture.height())])?;
-            Ok(picture)
+            // A hash that fits says nothing about values: the dataset may come from anywhere.
+            match picture.pixels().iter().flat_map(|rgb| rgb.0).all(|v| v.is_finite() && v >= 0.0) {
+                true => Ok(picture),
+                false => Err(EvalError::Unsound {
+                    place: format!("'{}', {}", self.folder.display(), listed_name(view, group)),
+                    expected: "light that is finite and not negative".to_owned(),
+                    found: "other values".to_owned(),
+                }),
+            }
         };
         (0..self.file.lights.len()).map(read).collect()
     }

@@ -57,7 +57,7 @@ struct LightMeter<'a> {
     /// The regions of each view.
     regions: Vec<Vec<MaskedRegion>>,
     /// The noise blocks of each view.
-    blocks: Vec<Picture<u32>>,
+    blocks: Vec<Picture<u64>>,
 }
 
 impl<'a> LightMeter<'a> {
