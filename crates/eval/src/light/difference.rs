@@ -256,7 +256,7 @@ mod tests {
     /// colours explains all, half, or nothing of the prediction's light.
     #[test]
     fn the_error_has_no_bias_and_is_stated() {
-        let blocks = Picture::from_fn(SIDE, SIDE, |x, y| (y * SIDE + x) as u32);
+        let blocks = Picture::from_fn(SIDE, SIDE, |x, y| (y * SIDE + x) as u64);
         for (factor, ratio) in [(0.6, 0.6), (0.6, 0.8), (1.5, 1.0), (0.5, 1.0)] {
             let room = Room::new(ratio);
             let exact = room.reference.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| factor * v)));
