@@ -159,42 +159,6 @@ pub enum RequestFault {
         /// How many there are.
         count: usize,
     },
-    /// Derivatives of a world with stage lights.
-    #[error("derivatives by base colours in a world with stage lights, expected the scene's own lights alone")]
-    StageDerivatives,
-    /// Blocks of pixels without pixels.
-    #[error("blocks of {0} x {0} pixels, expected at least 1 x 1")]
-    BlockSize(usize),
-    /// The derivative of a loss by a pixel is not finite.
-    #[error("the residual of the pixel in column {}, row {} is not finite", pixel[0], pixel[1])]
-    Residual {
-        /// Column and row of the first such pixel.
-        pixel: [usize; 2],
-    },
-    /// The number of grids differs from the number of surfaces.
-    #[error("{found} texel grids, expected one entry for each of {expected} surfaces")]
-    GridCount {
-        /// How many entries there are, missing grids included.
-        found: usize,
-        /// How many surfaces the world has.
-        expected: usize,
-    },
-    /// A grid of texels has no texels.
-    #[error("surface {} '{name}': a grid without texels", surface.0)]
-    EmptyGrid {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-    },
-    /// A surface has a grid of texels, but its mesh has no uv.
-    #[error("surface {} '{name}': a texel grid for a mesh without uv", surface.0)]
-    MissingUv {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-    },
     /// Pictures of one light basis differ in size, or a picture differs from the view that it belongs to.
     #[error("a picture of {}x{}, expected {}x{}", found[0], found[1], expected[0], expected[1])]
     PictureSize {
@@ -228,29 +192,6 @@ pub enum ExceededLimit {
         views: usize,
         /// Bytes that one group of lights takes.
         group_bytes: u64,
-        /// Bytes allowed.
-        allowed: u64,
-    },
-    /// The derivatives of blocks of pixels by base colours take more memory than is allowed.
-    #[error(
-        "derivatives of {}x{} blocks by {surfaces} base colours take {bytes} bytes, and {allowed} are allowed; \
-         use larger blocks", blocks[0], blocks[1]
-    )]
-    JacobianBytes {
-        /// Columns and rows of blocks.
-        blocks: [usize; 2],
-        /// Surfaces of the world.
-        surfaces: usize,
-        /// Bytes that the derivatives take.
-        bytes: u64,
-        /// Bytes allowed.
-        allowed: u64,
-    },
-    /// The derivatives of a loss by texels take more memory than is allowed.
-    #[error("derivatives by texels take {bytes} bytes, and {allowed} are allowed; use smaller grids, or fewer")]
-    TexelBytes {
-        /// Bytes that the derivatives take.
-        bytes: u64,
         /// Bytes allowed.
         allowed: u64,
     },

@@ -4,8 +4,7 @@
 //! [`mateval_scene::Camera`]s.
 //!
 //! Output: pictures of linear radiance ([`render()`]), the same per view and per group of lights ([`render_views`]),
-//! with predicted materials in place of the scene's own ([`render_repainted`]), their derivatives by the base colours
-//! of surfaces ([`part_jacobian()`]) or of texels ([`gradient()`]), and first hits ([`World::first_hit`],
+//! with predicted materials in place of the scene's own ([`render_repainted`]), and first hits ([`World::first_hit`],
 //! [`aov`]) for depth, normals, ids and material pictures.
 //!
 //! Steps between:
@@ -23,18 +22,14 @@
 pub mod accel;
 pub mod aov;
 pub mod bsdf;
-mod derivative_pass;
 pub mod emitter;
 pub mod error;
 pub mod film;
 mod frame;
-pub mod gradient;
 pub mod light_basis;
 mod material_source;
 pub mod noise_filter;
-pub mod part_jacobian;
 mod path;
-mod path_history;
 pub mod ray;
 pub mod render;
 pub mod repaint;
@@ -52,9 +47,7 @@ pub use accel::{Accel, Hit, InstructionSet, TriangleIndex, TriangleTest};
 pub use bsdf::{Bsdf, BsdfSample};
 pub use emitter::StageLight;
 pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
-pub use gradient::{TexelGradient, gradient};
 pub use light_basis::{LightBasis, LightGroups};
-pub use part_jacobian::{PartJacobian, part_jacobian};
 pub use ray::Ray;
 pub use render::{Render, RenderStats, render};
 pub use repaint::{Coat, Repaint, Scattering, render_repainted};

@@ -45,20 +45,3 @@ impl<'w, const K: usize> MaterialSource<'w, K> for OwnMaterials<'w> {
         self.0.bsdf_of_colors(place, wo)
     }
 }
-
-/// The scene's own materials, with black channels of base colours raised to 1e-12.
-#[derive(Clone, Copy)]
-pub(crate) struct AboveBlack<'w>(pub(crate) &'w World);
-
-impl<'w> MaterialSource<'w, 1> for AboveBlack<'w> {
-    fn prefetch(self, _: &Hit) {}
-
-    fn prefetch_texels(self, _: &Hit, place: &SurfaceHit) -> Vec2 {
-        self.0.prefetch_texels(place);
-        Vec2::ZERO
-    }
-
-    fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, 1> {
-        self.0.bsdf_above_black(place, wo)
-    }
-}

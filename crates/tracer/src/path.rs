@@ -10,7 +10,6 @@ use crate::accel::Hit;
 use crate::bsdf::{Bsdf, BsdfPart};
 use crate::emitter::Emitted;
 use crate::material_source::MaterialSource;
-use crate::path_history::{PathRecorder, VertexSlopes};
 use crate::ray::Ray;
 use crate::sampler::Sampler;
 use crate::settings::{LightSampling, RenderSettings};
@@ -117,16 +116,6 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     pub(crate) fn trace(
         &mut self,
         starts: impl IntoIterator<Item = (Sampler, Ray)>,
-        add: impl FnMut(usize, LightIndex, [Vec3; K]),
-    ) {
-        self.trace_recorded(starts, &mut (), add);
-    }
-
-    /// [`Self::trace`] with a `recorder` of the first variant's paths.
-    pub(crate) fn trace_recorded<R: PathRecorder>(
-        &mut self,
-        starts: impl IntoIterator<Item = (Sampler, Ray)>,
-        recorder: &mut R,
         mut add: impl FnMut(usize, LightIndex, [Vec3; K]),
     ) {
         self.paths.clear();
@@ -136,18 +125,11 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             self.paths.push(Path { which, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
             self.rays.push(ray);
         }
-        recorder.begin(self.paths.len());
         let mut scatterings = 0;
         while !self.paths.is_empty() {
-            self.arrive(scatterings, &mut |which, light, values: [Vec3; K]| {
-                recorder.meet(which, values[0]);
-                add(which, light, values);
-            });
-            self.scatter(scatterings, recorder);
-            self.add_unblocked(scatterings, &mut |which, light, values: [Vec3; K]| {
-                recorder.receive(which, values[0]);
-                add(which, light, values);
-            });
+            self.arrive(scatterings, &mut add);
+            self.scatter(scatterings);
+            self.add_unblocked(scatterings, &mut add);
             scatterings += 1;
         }
     }
@@ -200,7 +182,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     }
 
     /// Samples an emitter and the next ray at every arrival.
-    fn scatter<R: PathRecorder>(&mut self, scatterings: u32, recorder: &mut R) {
+    fn scatter(&mut self, scatterings: u32) {
         self.rays.clear();
         self.light_samples.clear();
         self.shadow_rays.clear();
@@ -209,27 +191,21 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             if bsdf.is_black() {
                 continue;
             }
-            let (which, mut slopes) = (path.which, VertexSlopes::default());
             // Sample an emitter; the shadow ray waits until all paths have got here.
             if self.settings.light_sampling != LightSampling::Bsdf
-                && let Some((ray, light_sample, direction)) =
+                && let Some((ray, light_sample)) =
                     sample_light(self.world, &self.settings, &path, &bsdf, &place, scatterings)
             {
-                if R::WANTS_SLOPES {
-                    slopes.to_light = bsdf.relative_slope(direction);
-                }
                 self.counts.shadow_rays += 1;
                 self.light_samples.push(light_sample);
                 self.shadow_rays.push(ray);
             }
             // Sample the direction in which the path continues.
-            let sampled = sample_continuation::<R, K>(self.world, &self.settings, path, &bsdf, &place, wo, scatterings);
-            if let Some((path, ray, slope)) = sampled {
-                slopes.onwards = slope;
+            let sampled = sample_continuation(self.world, &self.settings, path, &bsdf, &place, wo, scatterings);
+            if let Some((path, ray)) = sampled {
                 self.paths.push(path);
                 self.rays.push(ray);
             }
-            recorder.scatter(which, &place, slopes);
         }
     }
 
@@ -246,7 +222,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     }
 }
 
-/// Samples an emitter: returns the shadow ray, the light that arrives unless that ray is blocked, and its direction.
+/// Samples an emitter: returns the shadow ray, and the light that arrives unless that ray is blocked.
 fn sample_light<const K: usize>(
     world: &World,
     settings: &RenderSettings,
@@ -254,7 +230,7 @@ fn sample_light<const K: usize>(
     bsdf: &Bsdf<'_, K>,
     place: &SurfaceHit,
     scatterings: u32,
-) -> Option<(Ray, LightSample<K>, Vec3)> {
+) -> Option<(Ray, LightSample<K>)> {
     if bsdf.is_delta() {
         return None;
     }
@@ -278,13 +254,12 @@ fn sample_light<const K: usize>(
     let contribution = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
     let values = std::array::from_fn(contribution);
     let sample = LightSample { which: path.which, sampler: path.sampler, light: light.light, values };
-    Some((shadow, sample, light.direction))
+    Some((shadow, sample))
 }
 
 /// Samples the ray on which the path continues. Russian roulette has a fixed survival probability that does not depend
-/// on the throughput, so path lengths follow from geometry alone. Returns the relative slope of the BSDF too, zero
-/// unless `R` wants it.
-fn sample_continuation<R: PathRecorder, const K: usize>(
+/// on the throughput, so path lengths follow from geometry alone.
+fn sample_continuation<const K: usize>(
     world: &World,
     settings: &RenderSettings,
     mut path: Path<K>,
@@ -292,7 +267,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
     place: &SurfaceHit,
     wo: Vec3,
     scatterings: u32,
-) -> Option<(Path<K>, Ray, Vec3)> {
+) -> Option<(Path<K>, Ray)> {
     // Play Russian roulette.
     let [a, b, c, roulette] = path.sampler.set(2 + 2 * scatterings);
     if scatterings >= settings.roulette_start {
@@ -302,8 +277,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
         path.throughputs = path.throughputs.map(|throughput| throughput / settings.roulette_survival);
     }
     // Sample a direction; the weights of stage lights leave out highlights.
-    let (sample, slope) =
-        if R::WANTS_SLOPES { bsdf.sample_with_slope([a, b, c])? } else { (bsdf.sample([a, b, c])?, Vec3::ZERO) };
+    let sample = bsdf.sample([a, b, c])?;
     if world.emitters().are_on_stage() {
         let weights = bsdf.stage_weights(&sample);
         path.stage_throughputs = std::array::from_fn(|k| path.throughputs[k] * weights[k]);
@@ -318,7 +292,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
     if !is_behind_lamp {
         path.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
     }
-    Some((path, place.spawn(sample.wi), slope))
+    Some((path, place.spawn(sample.wi)))
 }
 
 /// Whether the camera sees the material of an emitter instead of its light.

@@ -270,14 +270,6 @@ impl World {
         let (material, table) = (&self.scene.materials[index], self.tables.of(index));
         Bsdf::of_material(material, table, &self.textures, &surface.mesh, hit, wo)
     }
-
-    /// [`Self::bsdf`] with black channels of the base colour raised to 1e-12.
-    pub(crate) fn bsdf_above_black(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_> {
-        let surface = &self.scene.surfaces[hit.surface.0];
-        let index = surface.material.0;
-        let (material, table) = (&self.scene.materials[index], self.tables.of(index));
-        Bsdf::of_material_above_black(material, table, &self.textures, &surface.mesh, hit, wo)
-    }
 }
 
 fn meshes(scene: &ReferenceScene) -> Vec<&TriangleMesh> {

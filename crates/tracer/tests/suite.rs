@@ -6,7 +6,6 @@ mod suite {
     mod closed_forms;
     mod escaping;
     mod estimators;
-    mod gradients;
     mod light_basis;
     mod mapped_lamps;
     mod repaint;

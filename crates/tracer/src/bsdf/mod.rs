@@ -13,7 +13,6 @@ mod principled_tables;
 mod principled_variants;
 mod rough_boundary;
 mod sample;
-mod slope;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -87,33 +86,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         hit: &SurfaceHit,
         wo: Vec3,
     ) -> Self {
-        Self::of_lobe(Lobe::at(material, table, textures, hit.uv), material, textures, mesh, hit, wo)
-    }
-
-    /// [`Self::of_material`], with black channels of the base colour raised to 1e-12, so that their light has a slope
-    /// over its value.
-    pub(crate) fn of_material_above_black(
-        material: &Material,
-        table: &'w Table,
-        textures: &[Texture],
-        mesh: &TriangleMesh,
-        hit: &SurfaceHit,
-        wo: Vec3,
-    ) -> Self {
-        let lobe = Lobe::at(material, table, textures, hit.uv).above_black();
-        Self::of_lobe(lobe, material, textures, mesh, hit, wo)
-    }
-
-    /// The BSDF of a `lobe` that was looked up in `material`.
-    #[inline]
-    fn of_lobe(
-        lobe: Lobe<'w>,
-        material: &Material,
-        textures: &[Texture],
-        mesh: &TriangleMesh,
-        hit: &SurfaceHit,
-        wo: Vec3,
-    ) -> Self {
+        let lobe = Lobe::at(material, table, textures, hit.uv);
         let normal = match &material.bump {
             Some(bump) => bump::bumped_normal(bump, textures, mesh, hit),
             None => hit.shading_normal,
@@ -188,12 +161,6 @@ impl<'w, const K: usize> Bsdf<'w, K> {
     /// Samples a direction from three numbers in [0, 1), independently of the base colours. `None` if the sample is
     /// absorbed.
     pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
-        Some(self.sample_locally(u)?.1)
-    }
-
-    /// [`Self::sample`], with the direction in the frame too.
-    #[inline]
-    fn sample_locally(&self, u: [f32; 3]) -> Option<(Vec3, BsdfSample<K>)> {
         let (local, weights, density, delta) = match &self.principled {
             Some(variants) => {
                 let (wi, weights, density) = variants.sample(u)?;
@@ -205,7 +172,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
             }
         };
         let wi = self.frame.world_from_local(local).normalize();
-        (self.geometric.dot(wi) * local.z > 0.0).then_some((local, BsdfSample { wi, weights, density, delta }))
+        (self.geometric.dot(wi) * local.z > 0.0).then_some(BsdfSample { wi, weights, density, delta })
     }
 
     /// The weights of `sample`, returned by [`Self::sample`], for stage lights: parts that do not reflect them are left

@@ -93,12 +93,6 @@ impl FacetAlbedo {
         let between = fresnel * self.mean / (1.0 - fresnel * (1.0 - self.mean));
         1.0 + between * (1.0 - self.directional) / self.directional
     }
-
-    /// The derivative of [`Self::gain`].
-    pub(crate) fn gain_slope(&self, fresnel: f32) -> f32 {
-        let kept = 1.0 - fresnel * (1.0 - self.mean);
-        self.mean / (kept * kept) * (1.0 - self.directional) / self.directional
-    }
 }
 
 /// A position between two entries of a row.

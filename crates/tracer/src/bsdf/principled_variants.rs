@@ -80,12 +80,6 @@ impl<const K: usize> PrincipledVariants<K> {
         Some((wi, self.values(&responses, BsdfPart::All).map(|value| value / density), density))
     }
 
-    /// The derivative of the first variant's value by its `base_color`, and that value.
-    pub(super) fn first_slope(&self, base_color: Vec3, wi: Vec3) -> (Vec3, Vec3) {
-        let response = self.view.response(wi);
-        (self.view.tint_slope(base_color).value(&response.of_colors()), self.tints[0].value(&response))
-    }
-
     fn responses(&self, wi: Vec3) -> Responses {
         let first = self.view.response(wi);
         match &self.second {

@@ -15,25 +15,12 @@ pub(crate) fn lambert(reflectance: Vec3, wi: Vec3) -> Vec3 {
 /// Oren and Nayar, "Generalization of Lambert's Reflectance Model" (SIGGRAPH 1994), section 4.4, with interreflection.
 /// As in Mitsuba 0.6's `roughdiffuse`, the standard deviation of the slope is `alpha` / sqrt(2).
 pub(crate) fn oren_nayar(reflectance: Vec3, alpha: f32, wo: Vec3, wi: Vec3) -> Vec3 {
-    let (direct, between) = oren_nayar_parts(alpha, wo, wi);
-    (reflectance * direct + reflectance * reflectance * between) * (FRAC_1_PI * wi.z)
-}
-
-/// The derivative of [`oren_nayar`] by the reflectance.
-pub(crate) fn oren_nayar_slope(reflectance: Vec3, alpha: f32, wo: Vec3, wi: Vec3) -> Vec3 {
-    let (direct, between) = oren_nayar_parts(alpha, wo, wi);
-    (Vec3::splat(direct) + 2.0 * reflectance * between) * (FRAC_1_PI * wi.z)
-}
-
-/// The factors of the reflectance and of its square.
-fn oren_nayar_parts(alpha: f32, wo: Vec3, wi: Vec3) -> (f32, f32) {
     let s2 = 0.5 * alpha * alpha;
     let (theta_o, theta_i) = (angle(wo), angle(wi));
     let (larger, smaller) = (theta_o.max(theta_i), theta_o.min(theta_i));
     let flat = (wo.truncate().length() * wi.truncate().length()).max(1e-12);
     let cos_phi = (wo.truncate().dot(wi.truncate()) / flat).clamp(-1.0, 1.0);
     let slope = 2.0 * smaller * FRAC_1_PI;
-
     // Direct illumination.
     let c1 = 1.0 - 0.5 * s2 / (s2 + 0.33);
     let behind = if cos_phi >= 0.0 { 0.0 } else { slope * slope * slope };
@@ -44,8 +31,7 @@ fn oren_nayar_parts(alpha: f32, wo: Vec3, wi: Vec3) -> (f32, f32) {
     let direct = c1 + cos_phi * c2 * tan(smaller) + (1.0 - cos_phi.abs()) * c3 * tan(0.5 * (larger + smaller));
     // Interreflection between facets.
     let between = 0.17 * s2 / (s2 + 0.13) * (1.0 - cos_phi * slope * slope);
-
-    (direct, between)
+    (reflectance * direct + reflectance * reflectance * between) * (FRAC_1_PI * wi.z)
 }
 
 fn angle(w: Vec3) -> f32 {

@@ -20,10 +20,6 @@ use dielectric::Dielectric;
 use plastic::{Coat, Plastic};
 pub(crate) use principled::{Principled, PrincipledView, Response, Tint};
 
-/// The base colour that black counts as where slopes over the value are wanted. The slope of such a channel is that of
-/// black, and the light of paths that meet it is smaller than f32 resolves beside other light.
-const LEAST_COLOR: f32 = 1e-12;
-
 /// A material's parameters at one point. Opaque materials expect `wo.z > 0`, dielectrics accept either side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Lobe<'w> {
@@ -113,30 +109,6 @@ impl<'w> Lobe<'w> {
             Self::Principled(principled) => principled.eval(wo, wi),
             Self::Black | Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => Vec3::ZERO,
         }
-    }
-
-    /// The derivative of [`Self::eval`] by the base colour, per channel; zero for models without one. Principled
-    /// materials are left out: theirs is [`PrincipledView::tint_slope`].
-    pub(crate) fn slope(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        match self {
-            _ if wo.z <= 0.0 || wi.z <= 0.0 => Vec3::ZERO,
-            Self::Lambert { .. } => diffuse::lambert(Vec3::ONE, wi),
-            Self::OrenNayar { reflectance, alpha } => diffuse::oren_nayar_slope(*reflectance, *alpha, wo, wi),
-            Self::Plastic(plastic) => plastic.slope(wo, wi),
-            _ => Vec3::ZERO,
-        }
-    }
-
-    /// The same with every channel of the base colour at least 1e-12.
-    pub(crate) fn above_black(mut self) -> Self {
-        match &mut self {
-            Self::Lambert { reflectance: color }
-            | Self::OrenNayar { reflectance: color, .. }
-            | Self::Plastic(Plastic { base: color, .. })
-            | Self::Principled(Principled { base_color: color, .. }) => *color = color.max(Vec3::splat(LEAST_COLOR)),
-            _ => {}
-        }
-        self
     }
 
     /// The density with which [`Self::sample`] samples `wi`, per solid angle. Delta lobes are left out.

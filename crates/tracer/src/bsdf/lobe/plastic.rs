@@ -48,13 +48,6 @@ impl Plastic<'_> {
         self.base / (Vec3::ONE - self.returned()) * self.base_share(wo, wi)
     }
 
-    /// The derivative of the value by the colour of the base, per channel.
-    pub(crate) fn slope(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        let left = Vec3::ONE - self.returned();
-        let by_color = if self.nonlinear { (left * left).recip() } else { left.recip() };
-        by_color * self.base_share(wo, wi)
-    }
-
     /// The fraction of the light from the base that the coat reflects back and the base scatters again.
     fn returned(&self) -> Vec3 {
         let inside = match self.coat {

@@ -211,30 +211,6 @@ impl PrincipledView {
         (gain * f0, gain * (Vec3::ONE - f0))
     }
 
-    /// The derivative of [`Self::tint`] by the base colour, per channel. It goes with [`Response::of_colors`].
-    pub(crate) fn tint_slope(&self, base_color: Vec3) -> Tint {
-        let (metal, metal_rise) = match &self.albedo {
-            _ if self.metallic == 0.0 => (Vec3::ZERO, Vec3::ZERO),
-            Some(albedo) => self.blender_metal_slope(albedo, base_color),
-            None => (Vec3::splat(self.metallic), Vec3::splat(-self.metallic)),
-        };
-        Tint { metal, metal_rise, base: Vec3::splat(self.base_weight) }
-    }
-
-    /// The derivative of [`Self::blender_metal`], zero outside 0..1, where that one does not change.
-    fn blender_metal_slope(&self, albedo: &FacetAlbedo, base_color: Vec3) -> (Vec3, Vec3) {
-        let channel = |f0: f32| {
-            if !(0.0..=1.0).contains(&f0) {
-                return (0.0, 0.0);
-            }
-            let mean = f0 + (1.0 - f0) / 21.0;
-            let (gain, slope) = (albedo.gain(mean), albedo.gain_slope(mean) * (20.0 / 21.0));
-            (self.metallic * (gain + slope * f0), self.metallic * (slope * (1.0 - f0) - gain))
-        };
-        let [x, y, z] = base_color.to_array().map(channel);
-        (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
-    }
-
     /// The response to light from `wi`. Both directions lie above the surface.
     pub(crate) fn response(&self, wi: Vec3) -> Response {
         let half = self.wo + wi;
@@ -301,13 +277,6 @@ impl PrincipledView {
         }
         let response = self.response(wi);
         (response.density > 0.0).then_some((wi, response))
-    }
-}
-
-impl Response {
-    /// Without what does not depend on the base colour.
-    pub(crate) fn of_colors(&self) -> Self {
-        Self { dielectric: 0.0, ..*self }
     }
 }
 
