@@ -5,7 +5,7 @@ use mateval_scene::Camera;
 use mateval_scene::material::Appearance;
 use mateval_scene::reference::SurfaceIndex;
 
-use crate::accel::Hit;
+use crate::ray::Hit;
 use crate::ray::Ray;
 use crate::world::World;
 

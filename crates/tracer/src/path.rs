@@ -6,15 +6,108 @@
 use glam::{Vec2, Vec3};
 use mateval_scene::reference::LightIndex;
 
-use crate::accel::Hit;
 use crate::bsdf::{Bsdf, BsdfPart};
 use crate::emitter::Emitted;
-use crate::material_source::MaterialSource;
-use crate::ray::Ray;
-use crate::sampler::Sampler;
-use crate::settings::{LightSampling, RenderSettings};
-use crate::surface_hit::SurfaceHit;
+use crate::error::RequestFault;
+use crate::ray::{Hit, Ray, SurfaceHit};
+use crate::sampling::Sampler;
 use crate::world::World;
+
+/// How paths find light. All strategies have the same mean and differ in noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightSampling {
+    /// Samples emitters and the BSDF, weighted by the power heuristic.
+    #[default]
+    Both,
+    /// Samples emitters. Light that a scattered ray meets counts only after a mirror or clear glass.
+    Emitters,
+    /// Samples the BSDF alone.
+    Bsdf,
+}
+
+/// Settings of a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Paths per pixel.
+    pub samples: u32,
+    /// Different seeds give independent pictures.
+    pub seed: u64,
+    /// The largest number of scatterings after the first before the last direct light of a path: Blender's "max
+    /// bounces". Mitsuba's `max_depth` is larger by 2.
+    pub max_bounces: u32,
+    /// The first bounce at which Russian roulette may end a path.
+    pub roulette_start: u32,
+    /// The probability that a path survives Russian roulette, above 0 and at most 1.
+    pub roulette_survival: f32,
+    /// How paths find light.
+    pub light_sampling: LightSampling,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            samples: 64,
+            seed: 0,
+            max_bounces: 16,
+            roulette_start: 4,
+            roulette_survival: 0.8,
+            light_sampling: LightSampling::Both,
+        }
+    }
+}
+
+impl RenderSettings {
+    /// Fails if a setting is out of range.
+    pub(crate) fn check(&self) -> Result<(), RequestFault> {
+        let Self { samples, roulette_survival, .. } = *self;
+        if samples == 0 {
+            return Err(RequestFault::Samples(samples));
+        }
+        if !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
+            return Err(RequestFault::RouletteSurvival(roulette_survival));
+        }
+        Ok(())
+    }
+}
+
+/// Supplies BSDFs for `K` material variants. Variants differ in base colour alone, so that one path serves all of them.
+pub(crate) trait MaterialSource<'w, const K: usize>: Copy {
+    /// Prefetches the memory that [`Self::prefetch_texels`] reads for `hit`.
+    fn prefetch(self, hit: &Hit);
+
+    /// Prefetches the texels at `place` and returns the uv to pass to [`Self::bsdf`].
+    fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2;
+
+    /// The BSDF at `place`, seen from `wo`, after `scatterings` earlier scatterings of the path.
+    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, scatterings: u32) -> Bsdf<'w, K>;
+
+    /// Whether a lamp that is hidden from the camera reflects light as well as emitting it. Blender's lamps do not.
+    const LAMPS_REFLECT: bool = false;
+
+    /// The radiance that leaves `place` towards `wo`, where it is known without tracing further. Never called
+    /// for the first surface of a path.
+    fn known_radiance(self, _place: &SurfaceHit, _wo: Vec3) -> Option<Vec3> {
+        None
+    }
+}
+
+/// The scene's own materials, the same for all variants.
+#[derive(Clone, Copy)]
+pub(crate) struct OwnMaterials<'w>(pub(crate) &'w World);
+
+impl<'w, const K: usize> MaterialSource<'w, K> for OwnMaterials<'w> {
+    fn prefetch(self, _: &Hit) {}
+
+    /// Returns zero: a `SurfaceHit` holds the uv of the surface itself.
+    fn prefetch_texels(self, _: &Hit, place: &SurfaceHit) -> Vec2 {
+        self.0.prefetch_texels(place);
+        Vec2::ZERO
+    }
+
+    fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
+        self.0.bsdf_of_colors(place, wo)
+    }
+}
 
 /// The largest number of material variants that one path can serve.
 pub(crate) const MOST_VARIANTS: usize = 8;

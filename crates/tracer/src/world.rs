@@ -9,14 +9,12 @@ use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use rayon::prelude::*;
 
-use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
+use crate::accel::{Accel, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::{Bsdf, MaterialTables};
 use crate::emitter::{Emitters, StageLight, escape_share};
 use crate::error::{SceneFault, SurfaceFault, TracerError};
-use crate::ray::Ray;
-use crate::sampler::unit_hash;
-use crate::surface_hit::SurfaceHit;
-use crate::triangle_record::TriangleRecord;
+use crate::ray::{Hit, Ray, SurfaceHit, TriangleIndex, TriangleRecord};
+use crate::sampling::unit_hash;
 
 /// A scene with its hierarchy, emitters and material tables.
 #[derive(Clone, Debug)]

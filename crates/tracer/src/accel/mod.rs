@@ -14,31 +14,12 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::reference::SurfaceIndex;
 
 use crate::error::{ExceededLimit, RequestFault, SceneFault, SurfaceFault, TracerError};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray, TriangleIndex};
 use build::BinaryTree;
 use kernel::{BoxRay, Kernel, Portable, TriangleRay};
 pub(crate) use kernel::{move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use traverse::Candidate;
 use wide::{WIDTH, Wide};
-
-/// The index of a triangle within the mesh of its surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct TriangleIndex(pub usize);
-
-/// An intersection of a ray with a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// The surface.
-    pub surface: SurfaceIndex,
-    /// The triangle, within that surface's mesh.
-    pub triangle: TriangleIndex,
-    /// Barycentric weights of the triangle's corners; they add up to 1.
-    pub barycentrics: Vec3,
-    /// Distance along the ray, in metres.
-    pub distance: f32,
-    /// The index of the triangle among all triangles, in the order of the surfaces.
-    pub(crate) global: u32,
-}
 
 /// The intersection test between a ray and a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::{BumpMap, ScalarInput};
 
-use crate::surface_hit::SurfaceHit;
+use crate::ray::SurfaceHit;
 
 /// The bumped normal, on the side of `hit.shading_normal`. The shading normal itself if the mesh has no usable uv.
 pub(crate) fn bumped_normal(bump: &BumpMap, textures: &[Texture], mesh: &TriangleMesh, hit: &SurfaceHit) -> Vec3 {
@@ -62,8 +62,8 @@ mod tests {
     use mateval_scene::reference::SurfaceIndex;
 
     use super::*;
-    use crate::accel::TriangleIndex;
-    use crate::triangle_record::TriangleRecord;
+    use crate::ray::TriangleIndex;
+    use crate::ray::TriangleRecord;
 
     /// Heights rise by 1 m over the texture, which covers 2 m of a square: a slope of one half. If the texture is
     /// repeated twice, the slope doubles; if it is turned by a quarter, the slope runs along v.

@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 use glam::{Vec2, Vec3};
 use mateval_scene::material::Distribution;
 
-use crate::warp;
+use crate::sampling;
 
 /// The microfacets of a rough surface.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ impl Facets {
         let stretched = Vec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
         let z = (1.0 - u[0]) * (1.0 + stretched.z) - stretched.z;
         let radius = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = warp::circle(u[1]);
+        let (sin, cos) = sampling::circle(u[1]);
         let half = Vec3::new(radius * cos, radius * sin, z) + stretched;
         Vec3::new(self.alpha * half.x, self.alpha * half.y, half.z.max(0.0)).normalize_or(Vec3::Z)
     }
@@ -98,7 +98,7 @@ impl Facets {
         let tan2 = -self.alpha * self.alpha * libm::logf(1.0 - u[0]);
         let z = 1.0 / (1.0 + tan2).sqrt();
         let radius = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = warp::circle(u[1]);
+        let (sin, cos) = sampling::circle(u[1]);
         (Vec2::new(cos, sin) * radius).extend(z)
     }
 }

@@ -23,8 +23,8 @@ use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::Material;
 
-use crate::frame::Frame;
-use crate::surface_hit::SurfaceHit;
+use crate::ray::SurfaceHit;
+use crate::sampling::Frame;
 pub(crate) use fresnel::eta_from_specular;
 use lobe::Lobe;
 pub(crate) use lobe::Principled;

@@ -97,7 +97,7 @@ fn views(lobe: &Lobe) -> Vec<Vec3> {
 
 fn draws(count: u32) -> impl Iterator<Item = [f32; 3]> {
     // Independent numbers: stratified ones would make a chi-square test too lenient.
-    (0..count).map(|k| [0, 1, 2].map(|stream| crate::sampler::unit_hash(k, 77 + stream)))
+    (0..count).map(|k| [0, 1, 2].map(|stream| crate::sampling::unit_hash(k, 77 + stream)))
 }
 
 const ROWS: usize = 16;
@@ -314,7 +314,7 @@ fn worst_exchange(model: &MaterialModel, gain: f32) -> (u32, f32) {
     with_lobe(model, |lobe| {
         let (mut pairs, mut worst) = (0, 0.0_f32);
         for u in draws(400) {
-            let view = crate::warp::sphere([u[0], u[1]]);
+            let view = crate::sampling::sphere([u[0], u[1]]);
             let wo = if lobe.transmits() { view } else { view.abs() };
             let drawn = lobe.sample(wo, [u[2], u[0], u[1]]).filter(|sample| !sample.delta);
             let Some(LocalSample { wi, .. }) = drawn else { continue };
@@ -350,8 +350,8 @@ fn glass_reflects_as_fresnel_says() {
 fn sides() {
     use std::sync::Arc;
 
-    use crate::accel::TriangleIndex;
-    use crate::triangle_record::TriangleRecord;
+    use crate::ray::TriangleIndex;
+    use crate::ray::TriangleRecord;
     use mateval_scene::TriangleMesh;
     use mateval_scene::reference::{MaterialIndex, Surface, SurfaceIndex};
 

@@ -6,12 +6,12 @@ use glam::Vec3;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{LightIndex, ReferenceScene, SurfaceIndex};
 
-use super::distribution::Distribution;
 use super::radiance_map::RadianceMap;
-use crate::accel::TriangleIndex;
-use crate::surface_hit::SurfaceHit;
-use crate::triangle_record::TriangleRecord;
-use crate::warp;
+use crate::ray::SurfaceHit;
+use crate::ray::TriangleIndex;
+use crate::ray::TriangleRecord;
+use crate::sampling;
+use crate::sampling::Distribution;
 
 /// What surfaces emit.
 #[derive(Clone, Debug)]
@@ -198,7 +198,7 @@ impl AreaEmitter {
         let which = self.starts.partition_point(|&start| start <= triangle) - 1;
         let index = TriangleIndex(triangle - self.starts[which]);
         let surface = self.surfaces.get(which).copied().unwrap_or(STAGE);
-        SurfaceHit::new(surface, index, &self.records[triangle], warp::triangle(u))
+        SurfaceHit::new(surface, index, &self.records[triangle], sampling::triangle(u))
     }
 
     /// The point on a stage light that a ray has hit.

@@ -6,10 +6,10 @@
 use glam::Vec3;
 
 use crate::emitter::Emitters;
-use crate::frame::Frame;
-use crate::sampler::Sampler;
-use crate::surface_hit::SurfaceHit;
-use crate::warp;
+use crate::ray::SurfaceHit;
+use crate::sampling;
+use crate::sampling::Frame;
+use crate::sampling::Sampler;
 
 /// The number of walks, in turn from all area emitters.
 const WALKS: u32 = 1024;
@@ -35,7 +35,7 @@ pub(crate) fn escape_share(emitters: &Emitters, first_opaque: impl Fn(&SurfaceHi
         for ray in 0..RAYS {
             let [u, v, ..] = sampler.set(1 + ray);
             let normal = if up { at.geometric_normal } else { -at.geometric_normal };
-            let direction = Frame::around(normal).world_from_local(warp::cosine_hemisphere([u, v]));
+            let direction = Frame::around(normal).world_from_local(sampling::cosine_hemisphere([u, v]));
             let met = first_opaque(&at, direction);
             if ray > 0 {
                 counted += 1;

@@ -7,7 +7,6 @@
 //! change how often each is chosen (`group_shares`).
 
 mod area;
-mod distribution;
 mod environment;
 mod escape;
 pub mod group_shares;
@@ -23,7 +22,7 @@ use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceInde
 use crate::accel::Accel;
 use crate::error::{LightFault, RequestFault, SceneFault, TracerError};
 use crate::ray::Ray;
-use crate::surface_hit::SurfaceHit;
+use crate::ray::SurfaceHit;
 use area::{AreaEmitter, LANES, Outlines, SurfaceEmission};
 use environment::EnvironmentMap;
 pub(crate) use escape::escape_share;

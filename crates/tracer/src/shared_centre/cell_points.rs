@@ -7,7 +7,7 @@
 //! "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels" (ACM TOG
 //! 39(6), 2020).
 
-use crate::sampler::Sampler;
+use crate::sampling::Sampler;
 
 /// The numbering of paths along one sequence: blocks of 2^`log_side` cells per side, `stride` numbers per cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,10 +8,10 @@ use super::plane::Plane;
 use super::splat::{self, Subject, TileCounts};
 use super::view_light::{ViewLight, ViewsRender};
 use crate::error::{RequestFault, TracerError};
-use crate::material_source::MaterialSource;
+use crate::path::MaterialSource;
 use crate::path::PathCounts;
+use crate::path::RenderSettings;
 use crate::render::{self, RenderStats};
-use crate::settings::RenderSettings;
 
 /// Views to be rendered.
 pub(crate) struct ViewsJob<'a, M> {

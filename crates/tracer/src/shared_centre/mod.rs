@@ -17,8 +17,8 @@ use mateval_scene::Camera;
 
 use crate::error::TracerError;
 use crate::light_basis::LightGroups;
-use crate::material_source::OwnMaterials;
-use crate::settings::RenderSettings;
+use crate::path::OwnMaterials;
+use crate::path::RenderSettings;
 use crate::world::World;
 use job::planes;
 pub(crate) use job::{Progress, ViewsJob};

@@ -12,11 +12,11 @@ use super::lighting::Lighting;
 use super::plane::{Plane, Window};
 use super::view_light::HalfLight;
 use crate::light_basis::LightBasis;
-use crate::material_source::MaterialSource;
+use crate::path::MaterialSource;
+use crate::path::RenderSettings;
 use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
-use crate::sampler::Sampler;
-use crate::settings::RenderSettings;
+use crate::sampling::Sampler;
 use crate::world::World;
 
 /// Counts of what happened in one tile.

@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 use glam::Vec3;
 
 use crate::bsdf::sample::LocalSample;
-use crate::warp;
+use crate::sampling;
 
 /// Lambert's diffuse reflection.
 pub(crate) fn lambert(reflectance: Vec3, wi: Vec3) -> Vec3 {
@@ -40,6 +40,6 @@ fn angle(w: Vec3) -> f32 {
 
 /// Samples a direction with a density proportional to the cosine; `value_at` evaluates it.
 pub(crate) fn sample(u: [f32; 2], value_at: impl Fn(Vec3) -> Vec3) -> Option<LocalSample> {
-    let wi = warp::cosine_hemisphere(u);
+    let wi = sampling::cosine_hemisphere(u);
     (wi.z > 0.0).then(|| LocalSample::spread(wi, value_at(wi), wi.z / PI))
 }

@@ -14,7 +14,7 @@ use super::facets::Facets;
 use super::fresnel::eta_from_specular;
 use super::sample::LocalSample;
 use super::tables::Table;
-use crate::warp;
+use crate::sampling;
 use conductor::{Conductor, reflection_density};
 use dielectric::Dielectric;
 use plastic::{Coat, Plastic};
@@ -116,7 +116,7 @@ impl<'w> Lobe<'w> {
         match self {
             Self::RoughDielectric(dielectric, facets) => dielectric.density_rough(facets, wo, wi),
             _ if wo.z <= 0.0 || wi.z <= 0.0 => 0.0,
-            Self::Lambert { .. } | Self::OrenNayar { .. } => warp::cosine_density(wi.z),
+            Self::Lambert { .. } | Self::OrenNayar { .. } => sampling::cosine_density(wi.z),
             Self::RoughConductor(_, facets) => reflection_density(facets, wo, wi),
             Self::Plastic(plastic) => plastic.density(wo, wi),
             Self::Principled(principled) => principled.density(wo, wi),

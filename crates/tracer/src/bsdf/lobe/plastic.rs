@@ -13,7 +13,7 @@ use crate::bsdf::facets::{Facets, reflect};
 use crate::bsdf::fresnel;
 use crate::bsdf::rough_boundary::RoughCoat;
 use crate::bsdf::sample::LocalSample;
-use crate::warp;
+use crate::sampling;
 
 /// The coat and its base at one point.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,7 @@ impl Plastic<'_> {
     /// The density of the directions that [`Self::eval`] covers.
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
         let coat_share = 1.0 - self.transmitted(wo.z);
-        let base = (1.0 - coat_share) * warp::cosine_density(wi.z);
+        let base = (1.0 - coat_share) * sampling::cosine_density(wi.z);
         match self.coat {
             Coat::Smooth { .. } => base,
             Coat::Rough { facets, .. } => base + coat_share * reflection_density(&facets, wo, wi),
@@ -84,7 +84,7 @@ impl Plastic<'_> {
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
         let coat_share = 1.0 - self.transmitted(wo.z);
         let wi = match self.coat {
-            _ if u[0] >= coat_share => warp::cosine_hemisphere([u[1], u[2]]),
+            _ if u[0] >= coat_share => sampling::cosine_hemisphere([u[1], u[2]]),
             Coat::Smooth { .. } => {
                 return Some(LocalSample::delta(Vec3::new(-wo.x, -wo.y, wo.z), self.tint, coat_share));
             }

@@ -23,7 +23,7 @@ use crate::bsdf::facets::{Facets, reflect};
 use crate::bsdf::fresnel;
 use crate::bsdf::principled_tables::{BlenderTables, FacetAlbedo};
 use crate::bsdf::sample::LocalSample;
-use crate::warp;
+use crate::sampling;
 
 /// The material at one point.
 #[derive(Clone, Copy, Debug)]
@@ -270,7 +270,7 @@ impl PrincipledView {
         let wi = if u[0] < self.facet_share {
             reflect(self.wo, Facets::new(Distribution::Ggx, self.alpha).sample(self.wo, [u[1], u[2]]))
         } else {
-            warp::cosine_hemisphere([u[1], u[2]])
+            sampling::cosine_hemisphere([u[1], u[2]])
         };
         if wi.z <= 0.0 {
             return None;
