@@ -14,10 +14,10 @@ use mateval_scene::reference::SurfaceIndex;
 
 use crate::error::{ExceededLimit, RequestFault, SceneFault, SurfaceFault, TracerError};
 use crate::ray::{Hit, Ray, TriangleIndex};
-use kernel::{BoxRay, Kernel, Portable, TriangleRay};
+use kernel::{BoxRay, Kernel, Portable, TriangleRay, WIDTH};
 pub(crate) use kernel::{move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use traverse::Candidate;
-use wide::{WIDTH, Wide};
+use wide::Wide;
 
 /// The intersection test between a ray and a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -16,52 +16,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 use rayon::prelude::*;
 
-use super::kernel::on_huge_pages;
-
-/// The number of boxes in a node and of triangles in a block.
-pub(super) const WIDTH: usize = 8;
-
-/// Eight boxes and their children: four cache lines.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Node {
-    /// Lower corners in `bounds[0]`, upper corners in `bounds[1]`; indexed by axis, then child.
-    pub(super) bounds: [[[f32; WIDTH]; 3]; 2],
-    pub(super) children: [Child; WIDTH],
-    /// Bit k is set if child k exists.
-    pub(super) filled: u32,
-}
-
-/// Up to eight triangles: 352 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub(super) struct Block {
-    /// Indexed by corner, axis, triangle. Triangles ascend. Unused lanes hold one point three times, which no ray hits.
-    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
-    pub(super) triangles: [u32; WIDTH],
-    /// The surface of each triangle.
-    pub(super) surfaces: [u32; WIDTH],
-}
-
-/// The index of a node, or the index of a block with the highest bit set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(transparent)]
-pub(super) struct Child(pub(super) u32);
-
-impl Child {
-    const BLOCK: u32 = 1 << 31;
-
-    #[inline(always)]
-    pub(super) fn is_block(self) -> bool {
-        self.0 & Self::BLOCK != 0
-    }
-
-    /// The index among nodes or among blocks.
-    #[inline(always)]
-    pub(super) fn place(self) -> usize {
-        (self.0 & !Self::BLOCK) as usize
-    }
-}
+use super::kernel::{Block, Child, Node, WIDTH, on_huge_pages};
 
 /// The whole hierarchy.
 #[derive(Debug)]

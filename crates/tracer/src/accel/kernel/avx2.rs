@@ -3,8 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{BoxRay, Boxes, Kernel, Portable, Stack, TriangleRay, Triangles, WIDENED};
-use crate::accel::wide::{Block, Node, WIDTH};
+use super::{Block, BoxRay, Boxes, Kernel, Node, Portable, Stack, TriangleRay, Triangles, WIDENED, WIDTH};
 
 /// A proof that this processor supports the instructions: only [`Self::detect`] creates it.
 #[derive(Clone, Copy, Debug)]

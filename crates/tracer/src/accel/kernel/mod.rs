@@ -33,10 +33,54 @@ mod avx2;
 
 use std::mem::MaybeUninit;
 
-use super::wide::{Block, Child, Node, WIDTH};
 use crate::ray::Ray;
 #[cfg(target_arch = "x86_64")]
 pub(super) use avx2::Avx2;
+
+/// The number of boxes in a node and of triangles in a block.
+pub(super) const WIDTH: usize = 8;
+
+/// Eight boxes and their children: four cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// Lower corners in `bounds[0]`, upper corners in `bounds[1]`; indexed by axis, then child.
+    pub(super) bounds: [[[f32; WIDTH]; 3]; 2],
+    pub(super) children: [Child; WIDTH],
+    /// Bit k is set if child k exists.
+    pub(super) filled: u32,
+}
+
+/// Up to eight triangles: 352 bytes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// Indexed by corner, axis, triangle. Triangles ascend. Unused lanes hold one point three times, which no ray hits.
+    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
+    pub(super) triangles: [u32; WIDTH],
+    /// The surface of each triangle.
+    pub(super) surfaces: [u32; WIDTH],
+}
+
+/// The index of a node, or the index of a block with the highest bit set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+pub(super) struct Child(pub(super) u32);
+
+impl Child {
+    pub(super) const BLOCK: u32 = 1 << 31;
+
+    #[inline(always)]
+    pub(super) fn is_block(self) -> bool {
+        self.0 & Self::BLOCK != 0
+    }
+
+    /// The index among nodes or among blocks.
+    #[inline(always)]
+    pub(super) fn place(self) -> usize {
+        (self.0 & !Self::BLOCK) as usize
+    }
+}
 
 /// The boxes of a node that a ray meets.
 pub(crate) struct Boxes<L> {
@@ -352,7 +396,7 @@ pub(super) struct FreeSlots<'s> {
     pub(super) children: &'s mut [MaybeUninit<Child>; WIDTH],
 }
 
-/// Bytes of a cache line.
+/// Bytes of a cache line. Prefetching and huge pages are hints: results do not depend on them.
 const LINE: usize = 64;
 
 /// Prefetches the cache lines of the value at `place`.
@@ -392,7 +436,7 @@ const PAGE: usize = 4096;
 
 /// Only changes how memory is mapped; a refusal costs nothing but time.
 #[cfg(target_os = "linux")]
-fn ask_for_huge_pages<T>(memory: &mut [std::mem::MaybeUninit<T>]) {
+fn ask_for_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
     let start = memory.as_mut_ptr().cast::<libc::c_void>();
     let skipped = start.align_offset(PAGE);
     let length = size_of_val(memory).saturating_sub(skipped) / PAGE * PAGE;
@@ -403,7 +447,7 @@ fn ask_for_huge_pages<T>(memory: &mut [std::mem::MaybeUninit<T>]) {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn ask_for_huge_pages<T>(_: &mut [std::mem::MaybeUninit<T>]) {}
+fn ask_for_huge_pages<T>(_: &mut [MaybeUninit<T>]) {}
 
 /// Asks the system to move `values` to huge pages now, at unchanged addresses. Many textures are smaller than a huge
 /// page, so the range extends beyond both ends and neighbouring memory moves too, unnoticed by its owners.
