@@ -22,53 +22,27 @@ pub enum TracerError {
 /// A part of a scene that contradicts itself or the rest of the scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneFault {
-    /// A surface.
     #[error("surface {}{}: {fault}", surface.0, quoted(name))]
     Surface {
-        /// Its place in the scene.
         surface: SurfaceIndex,
         /// Its name, where the meshes come with names.
         name: Option<String>,
-        /// The fault.
         fault: SurfaceFault,
     },
-    /// A material.
     #[error("material {} '{name}': {fault}", material.0)]
-    Material {
-        /// Its place in the scene.
-        material: MaterialIndex,
-        /// Its name.
-        name: String,
-        /// The fault.
-        fault: MaterialFault,
-    },
-    /// A group of lights.
+    Material { material: MaterialIndex, name: String, fault: MaterialFault },
     #[error("light {} '{name}': {fault}", light.0)]
-    Light {
-        /// Its place in the scene.
-        light: LightIndex,
-        /// Its name.
-        name: String,
-        /// The fault.
-        fault: LightFault,
-    },
+    Light { light: LightIndex, name: String, fault: LightFault },
 }
 
-/// What is wrong with a surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceFault {
     /// It names a material that does not exist.
     #[error("material {material} does not exist; the scene has {count} materials")]
-    MissingMaterial {
-        /// The material named.
-        material: usize,
-        /// How many materials the scene has.
-        count: usize,
-    },
+    MissingMaterial { material: usize, count: usize },
     /// A coordinate is not finite or too large for `f32` to resolve a metre.
     #[error("vertex {vertex} is at {position}, expected within {limit:e} m of the origin along each axis")]
     Position {
-        /// The vertex.
         vertex: usize,
         /// Its position, in metres.
         position: Vec3,
@@ -77,22 +51,13 @@ pub enum SurfaceFault {
     },
     /// A triangle names a vertex that does not exist.
     #[error("triangle {triangle} names vertices {vertices:?}, expected indices below {count}")]
-    MissingVertex {
-        /// The triangle.
-        triangle: usize,
-        /// The vertices named.
-        vertices: [u32; 3],
-        /// How many vertices the mesh has.
-        count: usize,
-    },
+    MissingVertex { triangle: usize, vertices: [u32; 3], count: usize },
     /// The number of normals or uvs differs from the number of vertices.
     #[error("{found} {attribute}, expected one for each of {expected} vertices")]
     AttributeCount {
         /// Which array: "normals" or "uvs".
         attribute: &'static str,
-        /// Its length.
         found: usize,
-        /// The number of vertices.
         expected: usize,
     },
     /// A normal or a uv is not finite.
@@ -105,7 +70,6 @@ pub enum SurfaceFault {
     },
 }
 
-/// What is wrong with a material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MaterialFault {
     /// A constant is not finite.
@@ -116,12 +80,7 @@ pub enum MaterialFault {
     IndexOfRefraction(f32),
     /// It names a texture that does not exist.
     #[error("texture {texture} does not exist; the scene has {count} textures")]
-    MissingTexture {
-        /// The texture named.
-        texture: usize,
-        /// How many textures the scene has.
-        count: usize,
-    },
+    MissingTexture { texture: usize, count: usize },
     /// It names a channel that textures do not have.
     #[error("texture channel {0}, expected 0, 1 or 2")]
     MissingChannel(usize),
@@ -135,20 +94,10 @@ pub enum LightFault {
     Radiance([f32; 3]),
     /// It names a texture that does not exist.
     #[error("texture {texture} does not exist; the scene has {count} textures")]
-    MissingTexture {
-        /// The texture named.
-        texture: usize,
-        /// How many textures the scene has.
-        count: usize,
-    },
+    MissingTexture { texture: usize, count: usize },
     /// It names a surface that does not exist.
     #[error("surface {surface} does not exist; the scene has {count} surfaces")]
-    MissingSurface {
-        /// The surface named.
-        surface: usize,
-        /// How many surfaces the scene has.
-        count: usize,
-    },
+    MissingSurface { surface: usize, count: usize },
     /// One of its surfaces emits for another light already.
     #[error("surface {0} emits twice, expected one light per surface")]
     SharedSurface(usize),
@@ -158,7 +107,6 @@ pub enum LightFault {
     /// A texel of its map is negative or not finite.
     #[error("texture {texture} holds the value {value}, expected finite values of at least 0")]
     MapValue {
-        /// The texture.
         texture: usize,
         /// The first such value.
         value: f32,
@@ -181,23 +129,18 @@ fn quoted(name: &Option<String>) -> String {
 /// An argument that contradicts another, or the world it is used with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestFault {
-    /// A light of a stage.
     #[error("stage light {}: {fault}", light.0)]
     StageLight {
         /// Its place on the stage.
         light: LightIndex,
-        /// The fault.
         fault: LightFault,
     },
-    /// The mesh of a light of a stage.
     #[error("stage light {}: {fault}", light.0)]
     StageMesh {
         /// Its place on the stage.
         light: LightIndex,
-        /// The fault.
         fault: SurfaceFault,
     },
-    /// Too few paths per pixel.
     #[error("{0} samples per pixel, expected at least 1")]
     Samples(u32),
     /// The probability of surviving Russian roulette is out of range.
@@ -208,92 +151,50 @@ pub enum RequestFault {
     RepeatedSeed(u64),
     /// A hierarchy is shared with a scene of other triangles.
     #[error("the hierarchy was built from other triangles than the scene's: it holds {hierarchy}, the scene {scene}")]
-    OtherTriangles {
-        /// How many triangles the hierarchy holds.
-        hierarchy: usize,
-        /// How many triangles the scene has.
-        scene: usize,
-    },
+    OtherTriangles { hierarchy: usize, scene: usize },
     /// Groups of lights were made for another scene.
     #[error("the light groups hold {found} lights, the scene has {expected}")]
-    GroupedLights {
-        /// How many lights the groups hold.
-        found: usize,
-        /// How many lights the scene has.
-        expected: usize,
-    },
+    GroupedLights { found: usize, expected: usize },
     /// The number of lists of light mixes differs from the number of predictions.
     #[error("light mixes for {found} predictions, expected {expected}")]
     MixedPredictions {
         /// For how many predictions there are mixes.
         found: usize,
-        /// How many predictions there are.
         expected: usize,
     },
     /// Predictions have different numbers of mixes.
     #[error("{found} light mixes for prediction {prediction}, expected {expected} as for the first")]
     MixCount {
-        /// The prediction.
         prediction: usize,
-        /// How many mixes it has.
         found: usize,
         /// How many the first one has.
         expected: usize,
     },
     /// A mix or a weighted sum does not have one weight for each light or group of lights.
     #[error("{found} weights, expected {expected}: one for each light or group of lights")]
-    WeightCount {
-        /// How many weights there are.
-        found: usize,
-        /// How many lights or groups there are.
-        expected: usize,
-    },
+    WeightCount { found: usize, expected: usize },
     /// A weight is negative or not finite.
     #[error("weight {found} of light {}, expected a finite one of at least 0", light.0)]
-    Weight {
-        /// The light.
-        light: LightIndex,
-        /// Its weight.
-        found: f64,
-    },
+    Weight { light: LightIndex, found: f64 },
     /// Predictions were made for a world with another number of surfaces.
     #[error("{atlases} atlases and {coats} coats, expected one of each for each of {surfaces} surfaces")]
     SurfaceCount {
-        /// How many atlases there are.
         atlases: usize,
         /// How many coats there are, missing ones included.
         coats: usize,
-        /// How many surfaces the world has.
         surfaces: usize,
     },
     /// An atlas has other triangles than its surface.
     #[error("surface {} '{name}': an atlas of {found} triangles for a mesh of {expected}", surface.0)]
-    AtlasTriangles {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-        /// How many triangles the atlas has.
-        found: usize,
-        /// How many triangles the surface has.
-        expected: usize,
-    },
+    AtlasTriangles { surface: SurfaceIndex, name: String, found: usize, expected: usize },
     /// A surface has a coat, but its atlas does not have one finite uv for each vertex.
     #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for some vertex", surface.0)]
-    AtlasUv {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-    },
+    AtlasUv { surface: SurfaceIndex, name: String },
     /// Coats hold different numbers of base colours, or none.
     #[error("surface {} '{name}': {found} base colours, expected {expected} on each surface", surface.0)]
     BaseColorCount {
-        /// The surface.
         surface: SurfaceIndex,
-        /// Its name.
         name: String,
-        /// How many base colours its coat holds.
         found: usize,
         /// The largest number on any surface; at least 1.
         expected: usize,
@@ -303,20 +204,10 @@ pub enum RequestFault {
     SecondScattering,
     /// Predictions are used with another world than they were made for.
     #[error("predictions for {found} surfaces in a world of {expected}")]
-    OtherWorld {
-        /// How many surfaces the predictions were made for.
-        found: usize,
-        /// How many surfaces the world has.
-        expected: usize,
-    },
+    OtherWorld { found: usize, expected: usize },
     /// The requested predictions do not exist.
     #[error("predictions {found:?} were requested, expected a range within 0..{count}")]
-    Predictions {
-        /// The requested range.
-        found: Range<usize>,
-        /// How many there are.
-        count: usize,
-    },
+    Predictions { found: Range<usize>, count: usize },
     /// Pictures of one light basis differ in size, or a picture differs from the view that it belongs to.
     #[error("a picture of {}x{}, expected {}x{}", found[0], found[1], expected[0], expected[1])]
     PictureSize {
@@ -332,25 +223,11 @@ pub enum RequestFault {
 pub enum ExceededLimit {
     /// More triangles than the hierarchy can number.
     #[error("{found} triangles, the limit is {limit}")]
-    Triangles {
-        /// How many there are.
-        found: usize,
-        /// The most that are supported.
-        limit: usize,
-    },
+    Triangles { found: usize, limit: usize },
     /// The pictures of a single group of lights take more memory than is allowed.
     #[error(
         "{halves} halves of {views} views take {group_bytes} bytes per group of lights, and {allowed} are allowed; \
          allow more, or make fewer views at a time"
     )]
-    BasisBytes {
-        /// Independent halves of each view.
-        halves: usize,
-        /// Views rendered together.
-        views: usize,
-        /// Bytes that one group of lights takes.
-        group_bytes: u64,
-        /// Bytes allowed.
-        allowed: u64,
-    },
+    BasisBytes { halves: usize, views: usize, group_bytes: u64, allowed: u64 },
 }

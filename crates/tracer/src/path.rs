@@ -25,7 +25,6 @@ pub enum LightSampling {
     Bsdf,
 }
 
-/// Settings of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Paths per pixel.
@@ -39,7 +38,6 @@ pub struct RenderSettings {
     pub roulette_start: u32,
     /// The probability that a path survives Russian roulette, above 0 and at most 1.
     pub roulette_survival: f32,
-    /// How paths find light.
     pub light_sampling: LightSampling,
 }
 
@@ -137,7 +135,6 @@ struct Scattered {
 /// A path in progress, for `K` material variants.
 #[derive(Clone, Copy)]
 struct Path<const K: usize> {
-    /// Index of the path's start.
     which: usize,
     sampler: Sampler,
     throughputs: [Vec3; K],

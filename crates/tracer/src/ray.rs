@@ -39,13 +39,11 @@ impl Ray {
         Self::new(origin, direction, f32::INFINITY)
     }
 
-    /// The origin.
     #[inline]
     pub fn origin(&self) -> Vec3 {
         self.origin
     }
 
-    /// The direction.
     #[inline]
     pub fn direction(&self) -> Vec3 {
         self.direction
@@ -57,7 +55,6 @@ impl Ray {
         self.max_distance
     }
 
-    /// The point at `distance`.
     #[inline]
     pub fn at(&self, distance: f32) -> Vec3 {
         self.origin + self.direction * distance
@@ -77,7 +74,6 @@ pub struct TriangleIndex(pub usize);
 /// An intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// The surface.
     pub surface: SurfaceIndex,
     /// The triangle, within that surface's mesh.
     pub triangle: TriangleIndex,
@@ -89,10 +85,8 @@ pub struct Hit {
     pub(crate) global: u32,
 }
 
-/// A point on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceHit {
-    /// The surface.
     pub surface: SurfaceIndex,
     /// The triangle of that surface.
     pub triangle: TriangleIndex,

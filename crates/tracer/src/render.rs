@@ -31,12 +31,10 @@ pub struct RenderStats {
     pub not_finite: u64,
 }
 
-/// A picture and the counts of its render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Render {
     /// Linear radiance.
     pub picture: Picture<LinearRgb>,
-    /// Counts of the render.
     pub stats: RenderStats,
 }
 

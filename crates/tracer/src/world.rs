@@ -129,7 +129,6 @@ impl World {
         Self { emitters, ..self.clone() }
     }
 
-    /// The scene.
     pub fn scene(&self) -> &ReferenceScene {
         &self.scene
     }
@@ -139,12 +138,10 @@ impl World {
         &self.accel
     }
 
-    /// The textures of the scene.
     pub fn textures(&self) -> &[Texture] {
         &self.textures
     }
 
-    /// The emitters.
     pub fn emitters(&self) -> &Emitters {
         &self.emitters
     }
@@ -235,12 +232,10 @@ impl World {
         self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
     }
 
-    /// The material at a hit.
     pub fn material(&self, hit: &Hit) -> &Material {
         self.material_of(hit.surface)
     }
 
-    /// The material of a surface.
     pub fn material_of(&self, surface: SurfaceIndex) -> &Material {
         &self.scene.materials[self.scene.surfaces[surface.0].material.0]
     }

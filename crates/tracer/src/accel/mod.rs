@@ -174,14 +174,8 @@ impl Accel {
         self.bounds
     }
 
-    /// The number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.starts[self.starts.len() - 1] as usize
-    }
-
-    /// The number of surfaces.
-    pub fn surface_count(&self) -> usize {
-        self.starts.len() - 1
     }
 
     /// The memory that the hierarchy takes, in bytes.

@@ -18,7 +18,6 @@ use rayon::prelude::*;
 
 use super::kernel::{Block, Child, Node, WIDTH, on_huge_pages};
 
-/// The whole hierarchy.
 #[derive(Debug)]
 pub(super) struct Wide {
     pub(super) nodes: Vec<Node>,
@@ -213,12 +212,10 @@ fn triangles_below(tree: &BinaryTree, root: usize) -> Vec<u32> {
 /// A binary tree over triangles. Node 0 is its root.
 struct BinaryTree(Bvh2);
 
-/// The contents of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum BinaryNode {
     /// The indices of two child nodes.
     Inner([usize; 2]),
-    /// The index of a triangle.
     Leaf(u32),
 }
 
@@ -253,12 +250,10 @@ impl BinaryTree {
         found
     }
 
-    /// The number of nodes.
     fn len(&self) -> usize {
         self.0.nodes.len()
     }
 
-    /// The contents of `node`.
     #[inline]
     fn node(&self, node: usize) -> BinaryNode {
         let found = &self.0.nodes[node];

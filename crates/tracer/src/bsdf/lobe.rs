@@ -138,7 +138,6 @@ impl<'w> Lobe<'w> {
     }
 }
 
-/// Lambert's diffuse reflection.
 fn lambert(reflectance: Vec3, wi: Vec3) -> Vec3 {
     reflectance * (FRAC_1_PI * wi.z)
 }
@@ -332,7 +331,6 @@ pub(crate) struct Plastic<'w> {
     coat: Coat<'w>,
 }
 
-/// The coat's boundary.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Coat<'w> {
     /// `inside` is the fraction of uniform light from inside that the coat reflects back.

@@ -41,7 +41,6 @@ pub struct Bsdf<'w, const K: usize = 1> {
     principled: Option<PrincipledVariants<K>>,
 }
 
-/// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample<const K: usize = 1> {
     /// Towards the light.

@@ -15,7 +15,6 @@ use super::facets::{diffuse_reflectance, eta_from_specular};
 use super::lobe::Lobe;
 use crate::error::{MaterialFault, SceneFault};
 
-/// One table per material.
 #[derive(Debug)]
 pub(crate) struct MaterialTables(Vec<Table>);
 

@@ -61,7 +61,6 @@ enum DistantKind {
 /// Light that arrives along a sampled direction unless something blocks it.
 #[derive(Clone, Copy, Debug)]
 pub struct EmitterSample {
-    /// The light group.
     pub light: LightIndex,
     /// Towards the emitter, unit length.
     pub direction: Vec3,
@@ -88,7 +87,6 @@ pub struct StageLight {
 /// Radiance that a ray has met by chance.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitted {
-    /// The light group.
     pub light: LightIndex,
     /// Linear Rec. 709.
     pub radiance: Vec3,
@@ -461,7 +459,6 @@ fn check_radiance(radiance: &[f32; 3]) -> Result<(), LightFault> {
 const WALKS: u32 = 1024;
 /// The largest number of rays of a walk. The first one leaves the lamp and does not count.
 const RAYS: u32 = 5;
-/// Seed of the walks.
 const SEED: u64 = 0xe5_ca9e;
 
 /// The share of rays that leave the scene, among those from surfaces on which the area emitters shine, or on which light

@@ -206,15 +206,14 @@ fn place(k: &Intrinsics, direction: DVec3) -> DVec2 {
     DVec2::new(k.cx + k.fx * direction.x / depth, k.cy - k.fy * direction.y / depth)
 }
 
+/// The numbering of paths along one sequence: blocks of 2^`log_side` cells per side, `stride` numbers per cell.
+///
 /// A view's pixel covers parts of several cells, so points must be spread evenly not only over whole cells but also
 /// over parts of them. Within a cell, the points are those of a Sobol sequence, sorted in Morton order. Paths are
 /// numbered in that order, cell after cell along a Morton curve over blocks of cells. A part of the plane then holds
 /// runs of consecutive numbers, and runs of a Sobol sequence are well spread themselves: the idea of Ahmed and Wonka,
 /// "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels" (ACM TOG
 /// 39(6), 2020).
-///
-///
-/// The numbering runs along one sequence: blocks of 2^`log_side` cells per side, `stride` numbers per cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Numbering {
     log_side: u32,

@@ -58,7 +58,6 @@ pub(super) struct Block {
     /// Indexed by corner, axis, triangle. Triangles ascend. Unused lanes hold one point three times, which no ray hits.
     pub(super) corners: [[[f32; WIDTH]; 3]; 3],
     pub(super) triangles: [u32; WIDTH],
-    /// The surface of each triangle.
     pub(super) surfaces: [u32; WIDTH],
 }
 
