@@ -65,7 +65,7 @@ fn mix(value: u64) -> u64 {
     splitmix64::number(value, 0)
 }
 
-/// Cumulative weights, scaled to end at 1.
+/// A discrete distribution: cumulative weights, scaled to end at 1.
 #[derive(Clone, Debug)]
 pub(crate) struct Distribution {
     /// `cumulative[k]` is the probability of all choices before k; there is one more entry than choices.
