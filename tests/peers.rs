@@ -10,7 +10,6 @@ mod peers {
     mod blender;
     mod blender_job;
     mod mitsuba;
-    mod mitsuba_gradients;
     mod mitsuba_rooms;
     mod mitsuba_small;
     mod python;

@@ -6,22 +6,18 @@
 //! star marks `closest_many` and `occluded_many`, as the path tracer uses them; the other numbers are for one ray at a
 //! time.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
+#![allow(unsafe_code, reason = "Embree is a C library")]
 
-#[path = "support/embree.rs"]
-mod embree;
-#[path = "support/rays.rs"]
-mod rays;
-#[path = "support/room.rs"]
-mod room;
-#[path = "support/timing.rs"]
-mod timing;
+mod support;
 
-use glam::Vec3;
+use std::ffi::{CString, c_char, c_int, c_uint, c_void};
+
+use glam::{DVec2, Vec3};
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_testkit::bench_scene;
 use mateval_tracer::{Accel, Ray, TriangleTest};
 
-use embree::{Embree, Mode};
+use support::{Contestant, camera, interleaved, median, room, speedup};
 
 const SIDE: u32 = 724;
 
@@ -34,7 +30,7 @@ fn main() {
         compare("bench/dense", scene.surfaces.into_iter().map(|s| s.mesh).collect(), &camera, rounds);
     }
     for triangles in [20_000, 1_000_000, 3_000_000] {
-        compare("room", room::room(triangles), &room::camera(SIDE), rounds);
+        compare("room", room(triangles), &camera(SIDE), rounds);
     }
 }
 
@@ -51,13 +47,13 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
     println!("{:.1} bytes a triangle", robust.memory_bytes() as f64 / triangles as f64);
 
     // Make the sets of rays.
-    let coherent = rays::coherent(camera);
-    let bounce = rays::bounced(&robust, &coherent);
-    let second = rays::bounced(&robust, &bounce);
-    let random = rays::uniform(&robust, SIDE * SIDE);
-    let shadow = rays::towards_ceiling(&robust, &coherent, Vec3::Z);
-    let shadow_2 = rays::towards_ceiling(&robust, &bounce, Vec3::Z);
-    let short = rays::shortened(&random, 1.5);
+    let coherent = coherent(camera);
+    let bounce = bounced(&robust, &coherent);
+    let second = bounced(&robust, &bounce);
+    let random = uniform(&robust, SIDE * SIDE);
+    let shadow = towards_ceiling(&robust, &coherent, Vec3::Z);
+    let shadow_2 = towards_ceiling(&robust, &bounce, Vec3::Z);
+    let short = shortened(&random, 1.5);
     println!(
         "{:22} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
         "times Embree's medium", "Embree's", "its robust", "fast", "watertight", "fast*", "watert.*", "differ"
@@ -128,10 +124,10 @@ fn builds(meshes: &[&TriangleMesh]) {
         Accel::build(meshes).unwrap();
         seconds.push(start.elapsed().as_secs_f64());
     }
-    let (theirs, ours) = (timing::median(&embree_seconds), timing::median(&seconds));
+    let (theirs, ours) = (median(&embree_seconds), median(&seconds));
     println!(
         "build: Embree {theirs:.3} s, ours {ours:.3} s: {:.2} times as long",
-        1.0 / timing::speedup(&embree_seconds, &seconds)
+        1.0 / speedup(&embree_seconds, &seconds)
     );
 }
 
@@ -152,10 +148,10 @@ fn sum_many<V: Copy>(rays: &[Ray], trace: impl Fn(&[Ray], &mut Vec<V>), value: i
 
 fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box<dyn FnMut() + 'a>; 6]) {
     let names = ["medium", "robust", "fast", "watertight", "fast, many", "watertight, many"];
-    let mut contestants: Vec<timing::Contestant> = names.into_iter().zip(runs).collect();
-    let seconds = timing::interleaved(rounds, &mut contestants);
-    let rate = |seconds: &[f64]| count as f64 / timing::median(seconds) / 1e6;
-    let ratio = |which: usize| timing::speedup(&seconds[0], &seconds[which]);
+    let mut contestants: Vec<Contestant> = names.into_iter().zip(runs).collect();
+    let seconds = interleaved(rounds, &mut contestants);
+    let rate = |seconds: &[f64]| count as f64 / median(seconds) / 1e6;
+    let ratio = |which: usize| speedup(&seconds[0], &seconds[which]);
     println!(
         "{kind:22} {:6.2} M/s {:9.2} {:9.2} {:9.2} {:9.2} {:9.2} {differing:9}",
         rate(&seconds[0]),
@@ -165,4 +161,228 @@ fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box
         ratio(4),
         ratio(5)
     );
+}
+
+/// Embree's build and traversal mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    /// RTC_BUILD_QUALITY_MEDIUM, the default.
+    Medium,
+    /// The same with RTC_SCENE_FLAG_ROBUST.
+    Robust,
+}
+
+/// A committed scene of Debian's Embree 3.13 (libembree-dev; header rtcore.h): bindings to the part that is used here.
+struct Embree {
+    device: *mut c_void,
+    scene: *mut c_void,
+}
+
+#[repr(C, align(16))]
+#[derive(Clone, Copy)]
+struct RtcRay {
+    origin: [f32; 3],
+    tnear: f32,
+    direction: [f32; 3],
+    time: f32,
+    tfar: f32,
+    mask: c_uint,
+    id: c_uint,
+    flags: c_uint,
+}
+
+#[repr(C, align(16))]
+struct RtcRayHit {
+    ray: RtcRay,
+    normal: [f32; 3],
+    u: f32,
+    v: f32,
+    triangle: c_uint,
+    geometry: c_uint,
+    instance: c_uint,
+}
+
+#[repr(C)]
+struct RtcIntersectContext {
+    flags: c_uint,
+    filter: *const c_void,
+    instance: c_uint,
+}
+
+const INVALID: c_uint = c_uint::MAX;
+const TRIANGLES: c_int = 0;
+const INDEX_BUFFER: c_int = 0;
+const VERTEX_BUFFER: c_int = 1;
+const FORMAT_UINT3: c_int = 0x5003;
+const FORMAT_FLOAT3: c_int = 0x9003;
+const QUALITY_MEDIUM: c_int = 1;
+const FLAG_ROBUST: c_int = 1 << 2;
+
+#[link(name = "embree3")]
+unsafe extern "C" {
+    fn rtcNewDevice(config: *const c_char) -> *mut c_void;
+    fn rtcReleaseDevice(device: *mut c_void);
+    fn rtcNewScene(device: *mut c_void) -> *mut c_void;
+    fn rtcReleaseScene(scene: *mut c_void);
+    fn rtcSetSceneBuildQuality(scene: *mut c_void, quality: c_int);
+    fn rtcSetSceneFlags(scene: *mut c_void, flags: c_int);
+    fn rtcNewGeometry(device: *mut c_void, kind: c_int) -> *mut c_void;
+    fn rtcReleaseGeometry(geometry: *mut c_void);
+    fn rtcSetNewGeometryBuffer(
+        geometry: *mut c_void,
+        kind: c_int,
+        slot: c_uint,
+        format: c_int,
+        stride: usize,
+        count: usize,
+    ) -> *mut c_void;
+    fn rtcCommitGeometry(geometry: *mut c_void);
+    fn rtcAttachGeometryByID(scene: *mut c_void, geometry: *mut c_void, id: c_uint);
+    fn rtcCommitScene(scene: *mut c_void);
+    fn rtcIntersect1(scene: *mut c_void, context: *mut RtcIntersectContext, hit: *mut RtcRayHit);
+    fn rtcOccluded1(scene: *mut c_void, context: *mut RtcIntersectContext, ray: *mut RtcRay);
+}
+
+impl Embree {
+    /// Copies the meshes and builds the scene with `threads` threads. `built` is called around the build alone.
+    fn new(meshes: &[&TriangleMesh], mode: Mode, threads: usize, built: &mut dyn FnMut(&mut dyn FnMut())) -> Self {
+        let config = CString::new(format!("threads={threads},start_threads=1")).unwrap();
+        // SAFETY: the calls follow the order in Embree's manual, and buffers have the lengths requested.
+        unsafe {
+            let device = rtcNewDevice(config.as_ptr());
+            assert!(!device.is_null());
+            let scene = rtcNewScene(device);
+            rtcSetSceneBuildQuality(scene, QUALITY_MEDIUM);
+            rtcSetSceneFlags(scene, if mode == Mode::Robust { FLAG_ROBUST } else { 0 });
+            for (id, mesh) in meshes.iter().enumerate() {
+                let geometry = rtcNewGeometry(device, TRIANGLES);
+                let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+                let to = rtcSetNewGeometryBuffer(geometry, VERTEX_BUFFER, 0, FORMAT_FLOAT3, 12, vertices);
+                std::ptr::copy_nonoverlapping(mesh.positions.as_ptr().cast::<f32>(), to.cast(), 3 * vertices);
+                let to = rtcSetNewGeometryBuffer(geometry, INDEX_BUFFER, 0, FORMAT_UINT3, 12, triangles);
+                std::ptr::copy_nonoverlapping(mesh.triangles.as_ptr().cast::<u32>(), to.cast(), 3 * triangles);
+                rtcCommitGeometry(geometry);
+                rtcAttachGeometryByID(scene, geometry, id as c_uint);
+                rtcReleaseGeometry(geometry);
+            }
+            built(&mut || rtcCommitScene(scene));
+            Self { device, scene }
+        }
+    }
+
+    /// Surface, triangle and distance of the nearest hit.
+    #[inline]
+    fn closest(&self, ray: &Ray) -> Option<(usize, usize, f32)> {
+        let mut hit = RtcRayHit {
+            ray: rtc_ray(ray),
+            normal: [0.0; 3],
+            u: 0.0,
+            v: 0.0,
+            triangle: INVALID,
+            geometry: INVALID,
+            instance: INVALID,
+        };
+        // SAFETY: the scene is committed; both structures are laid out as in the header.
+        unsafe { rtcIntersect1(self.scene, &mut context(), &mut hit) };
+        (hit.geometry != INVALID).then_some((hit.geometry as usize, hit.triangle as usize, hit.ray.tfar))
+    }
+
+    /// Whether the ray hits anything.
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        let mut ray = rtc_ray(ray);
+        // SAFETY: as in `closest`.
+        unsafe { rtcOccluded1(self.scene, &mut context(), &mut ray) };
+        ray.tfar < 0.0
+    }
+}
+
+impl Drop for Embree {
+    fn drop(&mut self) {
+        // SAFETY: `new` created both, and they are not used again.
+        unsafe {
+            rtcReleaseScene(self.scene);
+            rtcReleaseDevice(self.device);
+        }
+    }
+}
+
+#[inline]
+fn context() -> RtcIntersectContext {
+    RtcIntersectContext { flags: 0, filter: std::ptr::null(), instance: INVALID }
+}
+
+#[inline]
+fn rtc_ray(ray: &Ray) -> RtcRay {
+    RtcRay {
+        origin: ray.origin().to_array(),
+        tnear: 0.0,
+        direction: ray.direction().to_array(),
+        time: 0.0,
+        tfar: ray.max_distance(),
+        mask: INVALID,
+        id: 0,
+        flags: 0,
+    }
+}
+
+/// Unstratified numbers in [0, 1), four per ray.
+fn random(index: u32, stream: u32) -> [f32; 4] {
+    sobol_burley::sample_4d(index & 0xffff, 0, (index >> 16) ^ (stream << 20))
+}
+
+/// Camera rays through the pixel centres of `camera`, row by row.
+fn coherent(camera: &Camera) -> Vec<Ray> {
+    let [width, height] = [camera.intrinsics.width, camera.intrinsics.height];
+    let ray = |x: u32, y: u32| {
+        let place = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3())
+    };
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| ray(x, y)).collect()
+}
+
+/// Rays from uniform points in the scene's box, in uniform directions.
+fn uniform(accel: &Accel, count: u32) -> Vec<Ray> {
+    let [low, high] = accel.bounds();
+    let ray = |index: u32| {
+        let [x, y, z, _] = random(index, 1);
+        Ray::endless(low + (high - low) * Vec3::new(x, y, z), sphere(random(index, 2)))
+    };
+    (0..count).map(ray).collect()
+}
+
+/// Rays from the hits of `rays` into the half-space that each ray came from.
+fn bounced(accel: &Accel, rays: &[Ray]) -> Vec<Ray> {
+    let bounce = |(index, ray): (usize, &Ray)| {
+        let hit = accel.closest(ray)?;
+        let direction = (sphere(random(index as u32, 3)) - ray.direction()).try_normalize()?;
+        Some(Ray::endless(ray.at(hit.distance - 1e-3), direction))
+    };
+    rays.iter().enumerate().filter_map(bounce).collect()
+}
+
+/// Rays from the hits of `rays` to a point below the top of the scene's box, by a tenth of its height.
+fn towards_ceiling(accel: &Accel, rays: &[Ray], up: Vec3) -> Vec<Ray> {
+    let [low, high] = accel.bounds();
+    let shadow = |(index, ray): (usize, &Ray)| {
+        let from = ray.at(accel.closest(ray)?.distance - 1e-3);
+        let [x, y, z, _] = random(index as u32, 4);
+        let inside = low + (high - low) * (Vec3::splat(0.1) + Vec3::new(x, y, z) * 0.8);
+        let lamp = inside + up * (high.dot(up) - 0.1 * (high - low).dot(up) - inside.dot(up));
+        let towards = lamp - from;
+        Some(Ray::new(from, towards.try_normalize()?, towards.length()))
+    };
+    rays.iter().enumerate().filter_map(shadow).collect()
+}
+
+/// The same rays, each limited to `reach` metres.
+fn shortened(rays: &[Ray], reach: f32) -> Vec<Ray> {
+    rays.iter().map(|ray| Ray::new(ray.origin(), ray.direction(), reach)).collect()
+}
+
+fn sphere([a, b, ..]: [f32; 4]) -> Vec3 {
+    let z = 1.0 - 2.0 * a;
+    let (sin, cos) = libm::sincosf(std::f32::consts::TAU * b);
+    let radius = (1.0 - z * z).max(0.0).sqrt();
+    Vec3::new(radius * cos, radius * sin, z)
 }

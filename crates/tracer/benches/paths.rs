@@ -8,13 +8,12 @@
 //! 512x512 pixels, 6 bounces (Mitsuba's max_depth 8), no roulette.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
-#[path = "support/mitsuba.rs"]
-mod mitsuba;
-#[path = "support/room.rs"]
-mod room;
-#[path = "support/timing.rs"]
-mod timing;
+mod support;
 
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,8 +22,9 @@ use mateval_scene::Camera;
 use mateval_scene::reference::ReferenceScene;
 use mateval_testkit::bench_scene;
 use mateval_tracer::{RenderSettings, World, render};
-use mitsuba::Mitsuba;
 use rayon::ThreadPool;
+
+use support::{lit, median, room, speedup};
 
 const SIZE: u32 = 512;
 const MAX_BOUNCES: u32 = 6;
@@ -46,7 +46,7 @@ fn main() {
 fn load(scene: &str) -> Option<(ReferenceScene, Camera)> {
     match scene.strip_prefix("bench/") {
         Some(name) => Some(bench_scene::read(&bench_scene::folder(name)?, SIZE)),
-        None => Some(room::lit(room::room(scene.parse().unwrap()), SIZE)),
+        None => Some(lit(room(scene.parse().unwrap()), SIZE)),
     }
 }
 
@@ -75,15 +75,15 @@ fn measure(name: &str, scene: ReferenceScene, camera: &Camera, rounds: usize) {
     println!(
         "{name}, {triangles} triangles: {:.3} samples a pixel and CPU second, {:.2} us a sample, {rays:.1} rays a sample; \
          2 threads {:.2} times 1",
-        1.0 / timing::median(&ours),
-        timing::median(&ours) / f64::from(SIZE * SIZE) * 1e6,
-        timing::speedup(&walls[0], &walls[1]),
+        1.0 / median(&ours),
+        median(&ours) / f64::from(SIZE * SIZE) * 1e6,
+        speedup(&walls[0], &walls[1]),
     );
     for ((variant, _), seconds) in VARIANTS.iter().zip(&theirs) {
         println!(
             "  Mitsuba {variant}: {:.3} samples a pixel and CPU second; ours is {:.2} times as fast",
-            1.0 / timing::median(seconds),
-            timing::speedup(seconds, &ours)
+            1.0 / median(seconds),
+            speedup(seconds, &ours)
         );
     }
 }
@@ -123,5 +123,45 @@ fn run(world: &World, camera: &Camera, pool: &ThreadPool, seed: u64) -> Run {
         cpu: a_sample(cpu.elapsed().as_secs_f64()),
         wall: a_sample(wall.elapsed().as_secs_f64()),
         rays: (stats.rays + stats.shadow_rays) as f64 / stats.paths as f64,
+    }
+}
+
+/// A Mitsuba 3 process that has loaded a scene and renders on request (`tests/peers/path_speed_mitsuba.py`).
+struct Mitsuba {
+    process: Child,
+    requests: ChildStdin,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Mitsuba {
+    /// Loads the folder `scene` for `variant` and renders once, so that everything is compiled.
+    fn start(python: &OsStr, variant: &str, scene: &Path, size: u32, max_depth: u32, samples: u32) -> Self {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/peers/path_speed_mitsuba.py");
+        let mut process = Command::new(python)
+            .args([script.as_os_str(), OsStr::new(variant), scene.as_os_str()])
+            .args([size.to_string(), max_depth.to_string()])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (requests, answers) = (process.stdin.take().unwrap(), BufReader::new(process.stdout.take().unwrap()));
+        let mut mitsuba = Self { process, requests, answers };
+        mitsuba.render(samples);
+        mitsuba
+    }
+
+    /// Renders with `samples` per pixel and returns the CPU seconds it took.
+    fn render(&mut self, samples: u32) -> f64 {
+        writeln!(self.requests, "{samples}").unwrap();
+        let mut answer = String::new();
+        self.answers.read_line(&mut answer).unwrap();
+        answer.trim().parse().unwrap()
+    }
+}
+
+impl Drop for Mitsuba {
+    fn drop(&mut self) {
+        self.process.kill().ok();
+        self.process.wait().ok();
     }
 }

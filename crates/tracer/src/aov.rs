@@ -5,7 +5,7 @@ use mateval_scene::Camera;
 use mateval_scene::material::Appearance;
 use mateval_scene::reference::SurfaceIndex;
 
-use crate::accel::Hit;
+use crate::ray::Hit;
 use crate::ray::Ray;
 use crate::world::World;
 
@@ -96,7 +96,6 @@ pub fn flatness_values(seen: &Appearance) -> [f32; 8] {
 /// The first hit behind one point of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelHit {
-    /// The surface.
     pub surface: SurfaceIndex,
     /// The triangle, within the surface's mesh.
     pub triangle: usize,

@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use mateval_scene::reference::{LightIndex, SurfaceIndex};
-
-pub use crate::scene_fault::{LightFault, MaterialFault, SceneFault, SurfaceFault};
+use glam::Vec3;
+use mateval_scene::reference::{LightIndex, MaterialIndex, SurfaceIndex};
 
 /// Why something cannot be traced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -20,26 +19,128 @@ pub enum TracerError {
     Unsupported(#[from] ExceededLimit),
 }
 
+/// A part of a scene that contradicts itself or the rest of the scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SceneFault {
+    #[error("surface {}{}: {fault}", surface.0, quoted(name))]
+    Surface {
+        surface: SurfaceIndex,
+        /// Its name, where the meshes come with names.
+        name: Option<String>,
+        fault: SurfaceFault,
+    },
+    #[error("material {} '{name}': {fault}", material.0)]
+    Material { material: MaterialIndex, name: String, fault: MaterialFault },
+    #[error("light {} '{name}': {fault}", light.0)]
+    Light { light: LightIndex, name: String, fault: LightFault },
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceFault {
+    /// It names a material that does not exist.
+    #[error("material {material} does not exist; the scene has {count} materials")]
+    MissingMaterial { material: usize, count: usize },
+    /// A coordinate is not finite or too large for `f32` to resolve a metre.
+    #[error("vertex {vertex} is at {position}, expected within {limit:e} m of the origin along each axis")]
+    Position {
+        vertex: usize,
+        /// Its position, in metres.
+        position: Vec3,
+        /// The largest coordinate, in metres.
+        limit: f32,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertices {vertices:?}, expected indices below {count}")]
+    MissingVertex { triangle: usize, vertices: [u32; 3], count: usize },
+    /// The number of normals or uvs differs from the number of vertices.
+    #[error("{found} {attribute}, expected one for each of {expected} vertices")]
+    AttributeCount {
+        /// Which array: "normals" or "uvs".
+        attribute: &'static str,
+        found: usize,
+        expected: usize,
+    },
+    /// A normal or a uv is not finite.
+    #[error("the {attribute} hold a value at vertex {vertex} that is not finite")]
+    AttributeNotFinite {
+        /// Which array: "normals" or "uvs".
+        attribute: &'static str,
+        /// The first vertex concerned.
+        vertex: usize,
+    },
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MaterialFault {
+    /// A constant is not finite.
+    #[error("value {0}, expected a finite one")]
+    NotFinite(f32),
+    /// An index of refraction is not a finite number above 0.
+    #[error("index of refraction {0}, expected a finite one above 0")]
+    IndexOfRefraction(f32),
+    /// It names a texture that does not exist.
+    #[error("texture {texture} does not exist; the scene has {count} textures")]
+    MissingTexture { texture: usize, count: usize },
+    /// It names a channel that textures do not have.
+    #[error("texture channel {0}, expected 0, 1 or 2")]
+    MissingChannel(usize),
+}
+
+/// What is wrong with a light, of the scene or of a stage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LightFault {
+    /// Its radiance is negative or not finite.
+    #[error("radiance {0:?}, expected finite values of at least 0")]
+    Radiance([f32; 3]),
+    /// It names a texture that does not exist.
+    #[error("texture {texture} does not exist; the scene has {count} textures")]
+    MissingTexture { texture: usize, count: usize },
+    /// It names a surface that does not exist.
+    #[error("surface {surface} does not exist; the scene has {count} surfaces")]
+    MissingSurface { surface: usize, count: usize },
+    /// One of its surfaces emits for another light already.
+    #[error("surface {0} emits twice, expected one light per surface")]
+    SharedSurface(usize),
+    /// The transform of its map's uv is not finite.
+    #[error("the uv transform of its map is {0:?}, expected finite values")]
+    MapTransform([[f32; 3]; 2]),
+    /// A texel of its map is negative or not finite.
+    #[error("texture {texture} holds the value {value}, expected finite values of at least 0")]
+    MapValue {
+        texture: usize,
+        /// The first such value.
+        value: f32,
+    },
+    /// The scale of its environment map is negative or not finite.
+    #[error("scale {0} of its environment map, expected a finite one of at least 0")]
+    EnvironmentScale(f32),
+    /// The rotation of its environment map is not finite.
+    #[error("rotation {0:?} of its environment map, expected finite values")]
+    EnvironmentRotation([[f32; 3]; 3]),
+    /// A light of a stage has no triangles.
+    #[error("its mesh has no triangles, expected at least one")]
+    NoTriangles,
+}
+
+fn quoted(name: &Option<String>) -> String {
+    name.as_ref().map_or_else(String::new, |name| format!(" '{name}'"))
+}
+
 /// An argument that contradicts another, or the world it is used with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestFault {
-    /// A light of a stage.
     #[error("stage light {}: {fault}", light.0)]
     StageLight {
         /// Its place on the stage.
         light: LightIndex,
-        /// The fault.
         fault: LightFault,
     },
-    /// The mesh of a light of a stage.
     #[error("stage light {}: {fault}", light.0)]
     StageMesh {
         /// Its place on the stage.
         light: LightIndex,
-        /// The fault.
         fault: SurfaceFault,
     },
-    /// Too few paths per pixel.
     #[error("{0} samples per pixel, expected at least 1")]
     Samples(u32),
     /// The probability of surviving Russian roulette is out of range.
@@ -50,92 +151,50 @@ pub enum RequestFault {
     RepeatedSeed(u64),
     /// A hierarchy is shared with a scene of other triangles.
     #[error("the hierarchy was built from other triangles than the scene's: it holds {hierarchy}, the scene {scene}")]
-    OtherTriangles {
-        /// How many triangles the hierarchy holds.
-        hierarchy: usize,
-        /// How many triangles the scene has.
-        scene: usize,
-    },
+    OtherTriangles { hierarchy: usize, scene: usize },
     /// Groups of lights were made for another scene.
     #[error("the light groups hold {found} lights, the scene has {expected}")]
-    GroupedLights {
-        /// How many lights the groups hold.
-        found: usize,
-        /// How many lights the scene has.
-        expected: usize,
-    },
+    GroupedLights { found: usize, expected: usize },
     /// The number of lists of light mixes differs from the number of predictions.
     #[error("light mixes for {found} predictions, expected {expected}")]
     MixedPredictions {
         /// For how many predictions there are mixes.
         found: usize,
-        /// How many predictions there are.
         expected: usize,
     },
     /// Predictions have different numbers of mixes.
     #[error("{found} light mixes for prediction {prediction}, expected {expected} as for the first")]
     MixCount {
-        /// The prediction.
         prediction: usize,
-        /// How many mixes it has.
         found: usize,
         /// How many the first one has.
         expected: usize,
     },
     /// A mix or a weighted sum does not have one weight for each light or group of lights.
     #[error("{found} weights, expected {expected}: one for each light or group of lights")]
-    WeightCount {
-        /// How many weights there are.
-        found: usize,
-        /// How many lights or groups there are.
-        expected: usize,
-    },
+    WeightCount { found: usize, expected: usize },
     /// A weight is negative or not finite.
     #[error("weight {found} of light {}, expected a finite one of at least 0", light.0)]
-    Weight {
-        /// The light.
-        light: LightIndex,
-        /// Its weight.
-        found: f64,
-    },
+    Weight { light: LightIndex, found: f64 },
     /// Predictions were made for a world with another number of surfaces.
     #[error("{atlases} atlases and {coats} coats, expected one of each for each of {surfaces} surfaces")]
     SurfaceCount {
-        /// How many atlases there are.
         atlases: usize,
         /// How many coats there are, missing ones included.
         coats: usize,
-        /// How many surfaces the world has.
         surfaces: usize,
     },
     /// An atlas has other triangles than its surface.
     #[error("surface {} '{name}': an atlas of {found} triangles for a mesh of {expected}", surface.0)]
-    AtlasTriangles {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-        /// How many triangles the atlas has.
-        found: usize,
-        /// How many triangles the surface has.
-        expected: usize,
-    },
+    AtlasTriangles { surface: SurfaceIndex, name: String, found: usize, expected: usize },
     /// A surface has a coat, but its atlas does not have one finite uv for each vertex.
     #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for some vertex", surface.0)]
-    AtlasUv {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-    },
+    AtlasUv { surface: SurfaceIndex, name: String },
     /// Coats hold different numbers of base colours, or none.
     #[error("surface {} '{name}': {found} base colours, expected {expected} on each surface", surface.0)]
     BaseColorCount {
-        /// The surface.
         surface: SurfaceIndex,
-        /// Its name.
         name: String,
-        /// How many base colours its coat holds.
         found: usize,
         /// The largest number on any surface; at least 1.
         expected: usize,
@@ -145,56 +204,10 @@ pub enum RequestFault {
     SecondScattering,
     /// Predictions are used with another world than they were made for.
     #[error("predictions for {found} surfaces in a world of {expected}")]
-    OtherWorld {
-        /// How many surfaces the predictions were made for.
-        found: usize,
-        /// How many surfaces the world has.
-        expected: usize,
-    },
+    OtherWorld { found: usize, expected: usize },
     /// The requested predictions do not exist.
     #[error("predictions {found:?} were requested, expected a range within 0..{count}")]
-    Predictions {
-        /// The requested range.
-        found: Range<usize>,
-        /// How many there are.
-        count: usize,
-    },
-    /// Derivatives of a world with stage lights.
-    #[error("derivatives by base colours in a world with stage lights, expected the scene's own lights alone")]
-    StageDerivatives,
-    /// Blocks of pixels without pixels.
-    #[error("blocks of {0} x {0} pixels, expected at least 1 x 1")]
-    BlockSize(usize),
-    /// The derivative of a loss by a pixel is not finite.
-    #[error("the residual of the pixel in column {}, row {} is not finite", pixel[0], pixel[1])]
-    Residual {
-        /// Column and row of the first such pixel.
-        pixel: [usize; 2],
-    },
-    /// The number of grids differs from the number of surfaces.
-    #[error("{found} texel grids, expected one entry for each of {expected} surfaces")]
-    GridCount {
-        /// How many entries there are, missing grids included.
-        found: usize,
-        /// How many surfaces the world has.
-        expected: usize,
-    },
-    /// A grid of texels has no texels.
-    #[error("surface {} '{name}': a grid without texels", surface.0)]
-    EmptyGrid {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-    },
-    /// A surface has a grid of texels, but its mesh has no uv.
-    #[error("surface {} '{name}': a texel grid for a mesh without uv", surface.0)]
-    MissingUv {
-        /// The surface.
-        surface: SurfaceIndex,
-        /// Its name.
-        name: String,
-    },
+    Predictions { found: Range<usize>, count: usize },
     /// Pictures of one light basis differ in size, or a picture differs from the view that it belongs to.
     #[error("a picture of {}x{}, expected {}x{}", found[0], found[1], expected[0], expected[1])]
     PictureSize {
@@ -210,48 +223,11 @@ pub enum RequestFault {
 pub enum ExceededLimit {
     /// More triangles than the hierarchy can number.
     #[error("{found} triangles, the limit is {limit}")]
-    Triangles {
-        /// How many there are.
-        found: usize,
-        /// The most that are supported.
-        limit: usize,
-    },
+    Triangles { found: usize, limit: usize },
     /// The pictures of a single group of lights take more memory than is allowed.
     #[error(
         "{halves} halves of {views} views take {group_bytes} bytes per group of lights, and {allowed} are allowed; \
          allow more, or make fewer views at a time"
     )]
-    BasisBytes {
-        /// Independent halves of each view.
-        halves: usize,
-        /// Views rendered together.
-        views: usize,
-        /// Bytes that one group of lights takes.
-        group_bytes: u64,
-        /// Bytes allowed.
-        allowed: u64,
-    },
-    /// The derivatives of blocks of pixels by base colours take more memory than is allowed.
-    #[error(
-        "derivatives of {}x{} blocks by {surfaces} base colours take {bytes} bytes, and {allowed} are allowed; \
-         use larger blocks", blocks[0], blocks[1]
-    )]
-    JacobianBytes {
-        /// Columns and rows of blocks.
-        blocks: [usize; 2],
-        /// Surfaces of the world.
-        surfaces: usize,
-        /// Bytes that the derivatives take.
-        bytes: u64,
-        /// Bytes allowed.
-        allowed: u64,
-    },
-    /// The derivatives of a loss by texels take more memory than is allowed.
-    #[error("derivatives by texels take {bytes} bytes, and {allowed} are allowed; use smaller grids, or fewer")]
-    TexelBytes {
-        /// Bytes that the derivatives take.
-        bytes: u64,
-        /// Bytes allowed.
-        allowed: u64,
-    },
+    BasisBytes { halves: usize, views: usize, group_bytes: u64, allowed: u64 },
 }

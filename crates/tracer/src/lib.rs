@@ -4,8 +4,7 @@
 //! [`mateval_scene::Camera`]s.
 //!
 //! Output: pictures of linear radiance ([`render()`]), the same per view and per group of lights ([`render_views`]),
-//! with predicted materials in place of the scene's own ([`render_repainted`]), their derivatives by the base colours
-//! of surfaces ([`part_jacobian()`]) or of texels ([`gradient()`]), and first hits ([`World::first_hit`],
+//! with predicted materials in place of the scene's own ([`render_repainted`]), and first hits ([`World::first_hit`],
 //! [`aov`]) for depth, normals, ids and material pictures.
 //!
 //! Steps between:
@@ -14,53 +13,38 @@
 //! 2. [`Sampler`] derives every random number from seed, pixel and sample index.
 //! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
 //! 4. The material at that place becomes a [`Bsdf`]; [`emitter`] samples a light; the BSDF samples the next ray.
-//! 5. [`film`] averages the samples of each tile in a fixed order.
+//! 5. [`render`](mod@render) averages the samples of each tile in a fixed order.
 //! 6. [`noise_filter`] takes the noise out of a picture that people, SSIM or LPIPS see.
 //!
 //! Every machine computes the same bits: trigonometric functions come from the `libm` crate, or are sums and products
-//! in `warp`.
+//! in `sampling`.
 
 pub mod accel;
 pub mod aov;
 pub mod bsdf;
-mod derivative_pass;
 pub mod emitter;
 pub mod error;
-pub mod film;
-mod frame;
-pub mod gradient;
 pub mod light_basis;
-mod material_source;
 pub mod noise_filter;
-pub mod part_jacobian;
 mod path;
-mod path_history;
 pub mod ray;
 pub mod render;
 pub mod repaint;
-pub mod sampler;
-mod scene_fault;
-pub mod settings;
+mod sampling;
 pub mod shared_centre;
 pub mod split;
-pub mod surface_hit;
-mod triangle_record;
-mod warp;
 pub mod world;
 
-pub use accel::{Accel, Hit, InstructionSet, TriangleIndex, TriangleTest};
+pub use accel::{Accel, InstructionSet, TriangleTest};
 pub use bsdf::{Bsdf, BsdfSample};
 pub use emitter::StageLight;
 pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
-pub use gradient::{TexelGradient, gradient};
 pub use light_basis::{LightBasis, LightGroups};
-pub use part_jacobian::{PartJacobian, part_jacobian};
-pub use ray::Ray;
+pub use path::{LightSampling, RenderSettings};
+pub use ray::{Hit, Ray, SurfaceHit, TriangleIndex};
 pub use render::{Render, RenderStats, render};
 pub use repaint::{Coat, Repaint, Scattering, render_repainted};
-pub use sampler::Sampler;
-pub use settings::{LightSampling, RenderSettings};
+pub use sampling::Sampler;
 pub use shared_centre::{HalfLight, LightMix, Lighting, ViewLight, ViewsRender, render_views};
 pub use split::{AssumedSurfaces, PhotoCache, SplitLight, split_light};
-pub use surface_hit::SurfaceHit;
 pub use world::World;

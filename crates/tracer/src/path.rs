@@ -6,16 +6,106 @@
 use glam::{Vec2, Vec3};
 use mateval_scene::reference::LightIndex;
 
-use crate::accel::Hit;
 use crate::bsdf::{Bsdf, BsdfPart};
 use crate::emitter::Emitted;
-use crate::material_source::MaterialSource;
-use crate::path_history::{PathRecorder, VertexSlopes};
-use crate::ray::Ray;
-use crate::sampler::Sampler;
-use crate::settings::{LightSampling, RenderSettings};
-use crate::surface_hit::SurfaceHit;
+use crate::error::RequestFault;
+use crate::ray::{Hit, Ray, SurfaceHit};
+use crate::sampling::Sampler;
 use crate::world::World;
+
+/// How paths find light. All strategies have the same mean and differ in noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightSampling {
+    /// Samples emitters and the BSDF, weighted by the power heuristic.
+    #[default]
+    Both,
+    /// Samples emitters. Light that a scattered ray meets counts only after a mirror or clear glass.
+    Emitters,
+    /// Samples the BSDF alone.
+    Bsdf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Paths per pixel.
+    pub samples: u32,
+    /// Different seeds give independent pictures.
+    pub seed: u64,
+    /// The largest number of scatterings after the first before the last direct light of a path: Blender's "max
+    /// bounces". Mitsuba's `max_depth` is larger by 2.
+    pub max_bounces: u32,
+    /// The first bounce at which Russian roulette may end a path.
+    pub roulette_start: u32,
+    /// The probability that a path survives Russian roulette, above 0 and at most 1.
+    pub roulette_survival: f32,
+    pub light_sampling: LightSampling,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            samples: 64,
+            seed: 0,
+            max_bounces: 16,
+            roulette_start: 4,
+            roulette_survival: 0.8,
+            light_sampling: LightSampling::Both,
+        }
+    }
+}
+
+impl RenderSettings {
+    /// Fails if a setting is out of range.
+    pub(crate) fn check(&self) -> Result<(), RequestFault> {
+        let Self { samples, roulette_survival, .. } = *self;
+        if samples == 0 {
+            return Err(RequestFault::Samples(samples));
+        }
+        if !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
+            return Err(RequestFault::RouletteSurvival(roulette_survival));
+        }
+        Ok(())
+    }
+}
+
+/// Supplies BSDFs for `K` material variants. Variants differ in base colour alone, so that one path serves all of them.
+pub(crate) trait MaterialSource<'w, const K: usize>: Copy {
+    /// Prefetches the memory that [`Self::prefetch_texels`] reads for `hit`.
+    fn prefetch(self, hit: &Hit);
+
+    /// Prefetches the texels at `place` and returns the uv to pass to [`Self::bsdf`].
+    fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2;
+
+    /// The BSDF at `place`, seen from `wo`, after `scatterings` earlier scatterings of the path.
+    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, scatterings: u32) -> Bsdf<'w, K>;
+
+    /// Whether a lamp that is hidden from the camera reflects light as well as emitting it. Blender's lamps do not.
+    const LAMPS_REFLECT: bool = false;
+
+    /// The radiance that leaves `place` towards `wo`, where it is known without tracing further. Never called
+    /// for the first surface of a path.
+    fn known_radiance(self, _place: &SurfaceHit, _wo: Vec3) -> Option<Vec3> {
+        None
+    }
+}
+
+/// The scene's own materials, the same for all variants.
+#[derive(Clone, Copy)]
+pub(crate) struct OwnMaterials<'w>(pub(crate) &'w World);
+
+impl<'w, const K: usize> MaterialSource<'w, K> for OwnMaterials<'w> {
+    fn prefetch(self, _: &Hit) {}
+
+    /// Returns zero: a `SurfaceHit` holds the uv of the surface itself.
+    fn prefetch_texels(self, _: &Hit, place: &SurfaceHit) -> Vec2 {
+        self.0.prefetch_texels(place);
+        Vec2::ZERO
+    }
+
+    fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
+        self.0.bsdf_of_colors(place, wo)
+    }
+}
 
 /// The largest number of material variants that one path can serve.
 pub(crate) const MOST_VARIANTS: usize = 8;
@@ -45,7 +135,6 @@ struct Scattered {
 /// A path in progress, for `K` material variants.
 #[derive(Clone, Copy)]
 struct Path<const K: usize> {
-    /// Index of the path's start.
     which: usize,
     sampler: Sampler,
     throughputs: [Vec3; K],
@@ -117,16 +206,6 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     pub(crate) fn trace(
         &mut self,
         starts: impl IntoIterator<Item = (Sampler, Ray)>,
-        add: impl FnMut(usize, LightIndex, [Vec3; K]),
-    ) {
-        self.trace_recorded(starts, &mut (), add);
-    }
-
-    /// [`Self::trace`] with a `recorder` of the first variant's paths.
-    pub(crate) fn trace_recorded<R: PathRecorder>(
-        &mut self,
-        starts: impl IntoIterator<Item = (Sampler, Ray)>,
-        recorder: &mut R,
         mut add: impl FnMut(usize, LightIndex, [Vec3; K]),
     ) {
         self.paths.clear();
@@ -136,18 +215,11 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             self.paths.push(Path { which, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
             self.rays.push(ray);
         }
-        recorder.begin(self.paths.len());
         let mut scatterings = 0;
         while !self.paths.is_empty() {
-            self.arrive(scatterings, &mut |which, light, values: [Vec3; K]| {
-                recorder.meet(which, values[0]);
-                add(which, light, values);
-            });
-            self.scatter(scatterings, recorder);
-            self.add_unblocked(scatterings, &mut |which, light, values: [Vec3; K]| {
-                recorder.receive(which, values[0]);
-                add(which, light, values);
-            });
+            self.arrive(scatterings, &mut add);
+            self.scatter(scatterings);
+            self.add_unblocked(scatterings, &mut add);
             scatterings += 1;
         }
     }
@@ -200,7 +272,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     }
 
     /// Samples an emitter and the next ray at every arrival.
-    fn scatter<R: PathRecorder>(&mut self, scatterings: u32, recorder: &mut R) {
+    fn scatter(&mut self, scatterings: u32) {
         self.rays.clear();
         self.light_samples.clear();
         self.shadow_rays.clear();
@@ -209,27 +281,21 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             if bsdf.is_black() {
                 continue;
             }
-            let (which, mut slopes) = (path.which, VertexSlopes::default());
             // Sample an emitter; the shadow ray waits until all paths have got here.
             if self.settings.light_sampling != LightSampling::Bsdf
-                && let Some((ray, light_sample, direction)) =
+                && let Some((ray, light_sample)) =
                     sample_light(self.world, &self.settings, &path, &bsdf, &place, scatterings)
             {
-                if R::WANTS_SLOPES {
-                    slopes.to_light = bsdf.relative_slope(direction);
-                }
                 self.counts.shadow_rays += 1;
                 self.light_samples.push(light_sample);
                 self.shadow_rays.push(ray);
             }
             // Sample the direction in which the path continues.
-            let sampled = sample_continuation::<R, K>(self.world, &self.settings, path, &bsdf, &place, wo, scatterings);
-            if let Some((path, ray, slope)) = sampled {
-                slopes.onwards = slope;
+            let sampled = sample_continuation(self.world, &self.settings, path, &bsdf, &place, wo, scatterings);
+            if let Some((path, ray)) = sampled {
                 self.paths.push(path);
                 self.rays.push(ray);
             }
-            recorder.scatter(which, &place, slopes);
         }
     }
 
@@ -246,7 +312,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     }
 }
 
-/// Samples an emitter: returns the shadow ray, the light that arrives unless that ray is blocked, and its direction.
+/// Samples an emitter: returns the shadow ray, and the light that arrives unless that ray is blocked.
 fn sample_light<const K: usize>(
     world: &World,
     settings: &RenderSettings,
@@ -254,7 +320,7 @@ fn sample_light<const K: usize>(
     bsdf: &Bsdf<'_, K>,
     place: &SurfaceHit,
     scatterings: u32,
-) -> Option<(Ray, LightSample<K>, Vec3)> {
+) -> Option<(Ray, LightSample<K>)> {
     if bsdf.is_delta() {
         return None;
     }
@@ -278,13 +344,12 @@ fn sample_light<const K: usize>(
     let contribution = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
     let values = std::array::from_fn(contribution);
     let sample = LightSample { which: path.which, sampler: path.sampler, light: light.light, values };
-    Some((shadow, sample, light.direction))
+    Some((shadow, sample))
 }
 
 /// Samples the ray on which the path continues. Russian roulette has a fixed survival probability that does not depend
-/// on the throughput, so path lengths follow from geometry alone. Returns the relative slope of the BSDF too, zero
-/// unless `R` wants it.
-fn sample_continuation<R: PathRecorder, const K: usize>(
+/// on the throughput, so path lengths follow from geometry alone.
+fn sample_continuation<const K: usize>(
     world: &World,
     settings: &RenderSettings,
     mut path: Path<K>,
@@ -292,7 +357,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
     place: &SurfaceHit,
     wo: Vec3,
     scatterings: u32,
-) -> Option<(Path<K>, Ray, Vec3)> {
+) -> Option<(Path<K>, Ray)> {
     // Play Russian roulette.
     let [a, b, c, roulette] = path.sampler.set(2 + 2 * scatterings);
     if scatterings >= settings.roulette_start {
@@ -302,8 +367,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
         path.throughputs = path.throughputs.map(|throughput| throughput / settings.roulette_survival);
     }
     // Sample a direction; the weights of stage lights leave out highlights.
-    let (sample, slope) =
-        if R::WANTS_SLOPES { bsdf.sample_with_slope([a, b, c])? } else { (bsdf.sample([a, b, c])?, Vec3::ZERO) };
+    let sample = bsdf.sample([a, b, c])?;
     if world.emitters().are_on_stage() {
         let weights = bsdf.stage_weights(&sample);
         path.stage_throughputs = std::array::from_fn(|k| path.throughputs[k] * weights[k]);
@@ -318,7 +382,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
     if !is_behind_lamp {
         path.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
     }
-    Some((path, place.spawn(sample.wi), slope))
+    Some((path, place.spawn(sample.wi)))
 }
 
 /// Whether the camera sees the material of an emitter instead of its light.

@@ -14,14 +14,12 @@ use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::reference::{Surface, SurfaceIndex};
 use mateval_scene::{Camera, TriangleMesh};
 
-use crate::accel::{Hit, prefetch, prefetch_line};
+use crate::accel::{prefetch, prefetch_line};
 use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
 use crate::error::{RequestFault, TracerError};
-use crate::material_source::MaterialSource;
-use crate::path::MOST_VARIANTS;
-use crate::settings::RenderSettings;
+use crate::path::{MOST_VARIANTS, MaterialSource, RenderSettings};
+use crate::ray::{Hit, SurfaceHit};
 use crate::shared_centre::{Lighting, Progress, Subject, ViewsJob, ViewsRender};
-use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
 /// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when

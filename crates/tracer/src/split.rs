@@ -21,18 +21,14 @@ use mateval_scene::camera::Projection;
 use mateval_scene::material::PrincipledFlavour;
 use rayon::prelude::*;
 
-use crate::accel::Hit;
 use crate::aov::hit_through;
 use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
 use crate::error::{ExceededLimit, RequestFault, TracerError};
-use crate::film::{self, Tile};
 use crate::light_basis::LightBasis;
-use crate::material_source::MaterialSource;
-use crate::path::PathTracer;
-use crate::render::camera_start;
+use crate::path::{MaterialSource, PathTracer, RenderSettings};
+use crate::ray::{Hit, SurfaceHit};
+use crate::render::{Tile, camera_start, tiles};
 use crate::repaint::SPECULAR;
-use crate::settings::RenderSettings;
-use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
 /// A photo as a cache of the radiance that leaves the places it shows.
@@ -192,7 +188,7 @@ pub fn split_light(
     }
     let tables = BlenderTables::new(eta_from_specular(SPECULAR));
     let split = Split { assumed, cache, tables: &tables };
-    let tiles = film::tiles(width, height);
+    let tiles = tiles(width, height);
     let finished = AtomicUsize::new(0);
     // Each tile is put into the pictures as it is finished: all of them beside the pictures would take as much again.
     let bases: [LightBasis; 2] = from_fn(|_| LightBasis::black(width, height, pictures));

@@ -9,14 +9,12 @@ use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use rayon::prelude::*;
 
-use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
+use crate::accel::{Accel, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::{Bsdf, MaterialTables};
 use crate::emitter::{Emitters, StageLight, escape_share};
 use crate::error::{SceneFault, SurfaceFault, TracerError};
-use crate::ray::Ray;
-use crate::sampler::unit_hash;
-use crate::surface_hit::SurfaceHit;
-use crate::triangle_record::TriangleRecord;
+use crate::ray::{Hit, Ray, SurfaceHit, TriangleIndex, TriangleRecord};
+use crate::sampling::unit_hash;
 
 /// A scene with its hierarchy, emitters and material tables.
 #[derive(Clone, Debug)]
@@ -131,7 +129,6 @@ impl World {
         Self { emitters, ..self.clone() }
     }
 
-    /// The scene.
     pub fn scene(&self) -> &ReferenceScene {
         &self.scene
     }
@@ -141,12 +138,10 @@ impl World {
         &self.accel
     }
 
-    /// The textures of the scene.
     pub fn textures(&self) -> &[Texture] {
         &self.textures
     }
 
-    /// The emitters.
     pub fn emitters(&self) -> &Emitters {
         &self.emitters
     }
@@ -237,12 +232,10 @@ impl World {
         self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
     }
 
-    /// The material at a hit.
     pub fn material(&self, hit: &Hit) -> &Material {
         self.material_of(hit.surface)
     }
 
-    /// The material of a surface.
     pub fn material_of(&self, surface: SurfaceIndex) -> &Material {
         &self.scene.materials[self.scene.surfaces[surface.0].material.0]
     }
@@ -269,14 +262,6 @@ impl World {
         let index = surface.material.0;
         let (material, table) = (&self.scene.materials[index], self.tables.of(index));
         Bsdf::of_material(material, table, &self.textures, &surface.mesh, hit, wo)
-    }
-
-    /// [`Self::bsdf`] with black channels of the base colour raised to 1e-12.
-    pub(crate) fn bsdf_above_black(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_> {
-        let surface = &self.scene.surfaces[hit.surface.0];
-        let index = surface.material.0;
-        let (material, table) = (&self.scene.materials[index], self.tables.of(index));
-        Bsdf::of_material_above_black(material, table, &self.textures, &surface.mesh, hit, wo)
     }
 }
 

@@ -2,15 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod suite {
-    mod bench_room;
-    mod closed_forms;
-    mod escaping;
     mod estimators;
-    mod gradients;
-    mod light_basis;
-    mod mapped_lamps;
+    mod known_light;
+    mod lamps;
     mod repaint;
-    mod same_bytes;
-    mod shared_centre;
     mod split;
+    mod views;
 }

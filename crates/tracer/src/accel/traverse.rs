@@ -2,8 +2,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::kernel::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, prefetch};
-use super::wide::{Block, Child, Node, WIDTH, Wide};
+use super::kernel::{Block, BoxRay, Boxes, Child, Kernel, Node, Stack, TriangleRay, Triangles, WIDTH, prefetch};
+use super::wide::Wide;
 use crate::ray::Ray;
 
 /// A triangle hit by a ray.

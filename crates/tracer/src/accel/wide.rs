@@ -1,61 +1,23 @@
-//! The wide hierarchy that rays traverse: nodes of eight boxes, and blocks of up to eight triangles as leaves.
+//! The wide hierarchy that rays traverse, and how it is built: nodes of eight boxes, and blocks of up to eight triangles
+//! as leaves. Only this file names obvhs.
 //!
-//! Dynamic programming over the surface area cost decides which nodes of the binary tree become children of one wide
+//! First a binary tree of boxes: PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume
+//! Hierarchy Construction", 2018), then parallel reinsertion (the same authors, 2017). Each leaf holds one triangle.
+//!
+//! Then dynamic programming over the surface area cost decides which nodes of the binary tree become children of one wide
 //! node and which subtrees become one block (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs
 //! Through Compressed Wide BVHs", HPG 2017, section 4.1). About 90 bytes a triangle.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
 use rayon::prelude::*;
 
-use super::build::{BinaryNode, BinaryTree};
-use super::kernel::on_huge_pages;
+use super::kernel::{Block, Child, Node, WIDTH, on_huge_pages};
 
-/// The number of boxes in a node and of triangles in a block.
-pub(super) const WIDTH: usize = 8;
-
-/// Eight boxes and their children: four cache lines.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Node {
-    /// Lower corners in `bounds[0]`, upper corners in `bounds[1]`; indexed by axis, then child.
-    pub(super) bounds: [[[f32; WIDTH]; 3]; 2],
-    pub(super) children: [Child; WIDTH],
-    /// Bit k is set if child k exists.
-    pub(super) filled: u32,
-}
-
-/// Up to eight triangles: 352 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub(super) struct Block {
-    /// Indexed by corner, axis, triangle. Triangles ascend. Unused lanes hold one point three times, which no ray hits.
-    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
-    pub(super) triangles: [u32; WIDTH],
-    /// The surface of each triangle.
-    pub(super) surfaces: [u32; WIDTH],
-}
-
-/// The index of a node, or the index of a block with the highest bit set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(transparent)]
-pub(super) struct Child(pub(super) u32);
-
-impl Child {
-    const BLOCK: u32 = 1 << 31;
-
-    #[inline(always)]
-    pub(super) fn is_block(self) -> bool {
-        self.0 & Self::BLOCK != 0
-    }
-
-    /// The index among nodes or among blocks.
-    #[inline(always)]
-    pub(super) fn place(self) -> usize {
-        (self.0 & !Self::BLOCK) as usize
-    }
-}
-
-/// The whole hierarchy.
 #[derive(Debug)]
 pub(super) struct Wide {
     pub(super) nodes: Vec<Node>,
@@ -102,8 +64,10 @@ struct Collapse<'t> {
 }
 
 impl Wide {
-    /// Converts a binary tree over `triangles`. `starts` holds the number of triangles before each surface.
-    pub(super) fn collapse(tree: &BinaryTree, triangles: &[[Vec3; 3]], starts: &[u32]) -> Self {
+    /// Builds the hierarchy over at least one triangle with finite corners. `starts` holds the number of triangles before
+    /// each surface.
+    pub(super) fn build(triangles: &[[Vec3; 3]], starts: &[u32]) -> Self {
+        let tree = &BinaryTree::build(triangles);
         let collapse = Collapse { tree, costs: costs(tree) };
         let (mut nodes, mut roots) = (Vec::new(), Vec::new());
         let root = collapse.child(0, &mut roots);
@@ -243,4 +207,74 @@ fn triangles_below(tree: &BinaryTree, root: usize) -> Vec<u32> {
     }
     found.sort_unstable();
     found
+}
+
+/// A binary tree over triangles. Node 0 is its root.
+struct BinaryTree(Bvh2);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum BinaryNode {
+    /// The indices of two child nodes.
+    Inner([usize; 2]),
+    Leaf(u32),
+}
+
+impl BinaryTree {
+    /// Builds the tree over at least one triangle with finite corners.
+    fn build(triangles: &[[Vec3; 3]]) -> Self {
+        let boxes: Vec<Aabb> =
+            triangles.par_iter().map(|corners| Aabb::from_points(&corners.map(Vec3A::from))).collect();
+        let params = BvhBuildParams::medium_build();
+        let indices = (0..boxes.len() as u32).collect();
+        let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+            params.ploc_search_distance,
+            &boxes,
+            indices,
+            params.sort_precision,
+            params.search_depth_threshold,
+        );
+        ReinsertionOptimizer::default().run(&mut tree, params.reinsertion_batch_ratio, None);
+        Self(tree)
+    }
+
+    /// All inner nodes, parents before their children.
+    fn inner_nodes(&self) -> Vec<u32> {
+        let mut found = Vec::with_capacity(self.0.nodes.len() / 2);
+        let mut open = vec![0];
+        while let Some(node) = open.pop() {
+            if let BinaryNode::Inner([left, right]) = self.node(node) {
+                found.push(node as u32);
+                open.extend([right, left]);
+            }
+        }
+        found
+    }
+
+    fn len(&self) -> usize {
+        self.0.nodes.len()
+    }
+
+    #[inline]
+    fn node(&self, node: usize) -> BinaryNode {
+        let found = &self.0.nodes[node];
+        let first = found.first_index as usize;
+        if found.is_leaf() {
+            BinaryNode::Leaf(self.0.primitive_indices[first])
+        } else {
+            BinaryNode::Inner([first, first + 1])
+        }
+    }
+
+    /// The lower and the upper corner of a node's box.
+    #[inline]
+    fn bounds(&self, node: usize) -> [Vec3; 2] {
+        let Aabb { min, max } = self.0.nodes[node].aabb;
+        [min.into(), max.into()]
+    }
+
+    /// Half the surface area of a node's box.
+    #[inline]
+    fn half_area(&self, node: usize) -> f32 {
+        self.0.nodes[node].aabb.half_area()
+    }
 }

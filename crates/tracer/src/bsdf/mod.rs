@@ -4,36 +4,29 @@
 //! Evaluation includes the cosine. The choice of a lobe never depends on a colour, so the same paths serve any base
 //! colours.
 
-mod bump;
+mod albedo_tables;
 mod facets;
-mod fresnel;
 mod lobe;
-mod part;
-mod principled_tables;
-mod principled_variants;
-mod rough_boundary;
-mod sample;
-mod slope;
+mod principled;
 mod tables;
 #[cfg(test)]
 mod tests;
-mod uniform_reflectance;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
-use mateval_scene::material::Material;
+use mateval_scene::material::{BumpMap, Material, ScalarInput};
 
-use crate::frame::Frame;
-use crate::surface_hit::SurfaceHit;
-pub(crate) use fresnel::eta_from_specular;
+use crate::ray::SurfaceHit;
+use crate::sampling::Frame;
+pub(crate) use albedo_tables::BlenderTables;
+use albedo_tables::Table;
+pub(crate) use facets::eta_from_specular;
 use lobe::Lobe;
-pub(crate) use lobe::Principled;
-pub(crate) use part::BsdfPart;
-pub(crate) use principled_tables::BlenderTables;
-use principled_variants::{PrincipledVariants, SecondPrincipled};
-pub(crate) use tables::{MaterialTables, Table};
-pub use uniform_reflectance::ReflectanceMeter;
+pub(crate) use principled::{BsdfPart, Principled};
+use principled::{PrincipledVariants, SecondPrincipled};
+pub(crate) use tables::MaterialTables;
+pub use tables::ReflectanceMeter;
 
 /// The BSDF of a surface at one point, for `K` base colours at once.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +41,6 @@ pub struct Bsdf<'w, const K: usize = 1> {
     principled: Option<PrincipledVariants<K>>,
 }
 
-/// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample<const K: usize = 1> {
     /// Towards the light.
@@ -87,35 +79,9 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         hit: &SurfaceHit,
         wo: Vec3,
     ) -> Self {
-        Self::of_lobe(Lobe::at(material, table, textures, hit.uv), material, textures, mesh, hit, wo)
-    }
-
-    /// [`Self::of_material`], with black channels of the base colour raised to 1e-12, so that their light has a slope
-    /// over its value.
-    pub(crate) fn of_material_above_black(
-        material: &Material,
-        table: &'w Table,
-        textures: &[Texture],
-        mesh: &TriangleMesh,
-        hit: &SurfaceHit,
-        wo: Vec3,
-    ) -> Self {
-        let lobe = Lobe::at(material, table, textures, hit.uv).above_black();
-        Self::of_lobe(lobe, material, textures, mesh, hit, wo)
-    }
-
-    /// The BSDF of a `lobe` that was looked up in `material`.
-    #[inline]
-    fn of_lobe(
-        lobe: Lobe<'w>,
-        material: &Material,
-        textures: &[Texture],
-        mesh: &TriangleMesh,
-        hit: &SurfaceHit,
-        wo: Vec3,
-    ) -> Self {
+        let lobe = Lobe::at(material, table, textures, hit.uv);
         let normal = match &material.bump {
-            Some(bump) => bump::bumped_normal(bump, textures, mesh, hit),
+            Some(bump) => bumped_normal(bump, textures, mesh, hit),
             None => hit.shading_normal,
         };
         Self::at(hit, normal, wo, lobe, material.two_sided, None)
@@ -188,12 +154,6 @@ impl<'w, const K: usize> Bsdf<'w, K> {
     /// Samples a direction from three numbers in [0, 1), independently of the base colours. `None` if the sample is
     /// absorbed.
     pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
-        Some(self.sample_locally(u)?.1)
-    }
-
-    /// [`Self::sample`], with the direction in the frame too.
-    #[inline]
-    fn sample_locally(&self, u: [f32; 3]) -> Option<(Vec3, BsdfSample<K>)> {
         let (local, weights, density, delta) = match &self.principled {
             Some(variants) => {
                 let (wi, weights, density) = variants.sample(u)?;
@@ -205,7 +165,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
             }
         };
         let wi = self.frame.world_from_local(local).normalize();
-        (self.geometric.dot(wi) * local.z > 0.0).then_some((local, BsdfSample { wi, weights, density, delta }))
+        (self.geometric.dot(wi) * local.z > 0.0).then_some(BsdfSample { wi, weights, density, delta })
     }
 
     /// The weights of `sample`, returned by [`Self::sample`], for stage lights: parts that do not reflect them are left
@@ -236,4 +196,53 @@ impl<'w, const K: usize> Bsdf<'w, K> {
 fn turned_to(normal: Vec3, wo: Vec3) -> Vec3 {
     let cos = normal.dot(wo);
     if cos >= GRAZING { normal } else { (normal + wo * (GRAZING - cos)).normalize() }
+}
+
+/// Bump mapping: the shading normal tilted by the slope of a height texture, on the side of `hit.shading_normal`. The
+/// shading normal itself if the mesh has no usable uv.
+///
+/// Blinn, "Simulation of Wrinkled Surfaces" (1978), without the surface's own curvature: the tangents dp/du and dp/dv
+/// are raised along the normal by the slope of the height, and their cross product is the new normal.
+fn bumped_normal(bump: &BumpMap, textures: &[Texture], mesh: &TriangleMesh, hit: &SurfaceHit) -> Vec3 {
+    let normal = hit.shading_normal;
+    let Some([dp_du, dp_dv]) = tangents(mesh, hit.triangle.0) else { return normal };
+    let slope = slope(&bump.height, textures, hit.uv) * bump.scale;
+    let raised = |tangent: Vec3, slope: f32| tangent + normal * (slope - normal.dot(tangent));
+    let bent = raised(dp_du, slope.x).cross(raised(dp_dv, slope.y)).normalize_or(normal);
+    let bent = if bent.dot(normal) < 0.0 { -bent } else { bent };
+    if bent.is_finite() { bent } else { normal }
+}
+
+/// The derivatives of the position by u and by v over the triangle, in metres.
+fn tangents(mesh: &TriangleMesh, triangle: usize) -> Option<[Vec3; 2]> {
+    let uvs = mesh.uvs.as_ref()?;
+    let [a, b, c] = mesh.corners(triangle);
+    let [ta, tb, tc] = mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
+    let (e1, e2, d1, d2) = (b - a, c - a, tb - ta, tc - ta);
+    let area = d1.x * d2.y - d1.y * d2.x;
+    let tangents = [(e1 * d2.y - e2 * d1.y) / area, (e2 * d1.x - e1 * d2.x) / area];
+    tangents.iter().all(|t| t.is_finite()).then_some(tangents)
+}
+
+/// The derivatives of the height by the surface's u and v. As in Mitsuba, this is the slope of the bilinear lookup
+/// itself, which jumps from texel to texel.
+fn slope(height: &ScalarInput, textures: &[Texture], uv: Vec2) -> Vec2 {
+    let ScalarInput::Texture { texture, channel, uv: transform } = height else { return Vec2::ZERO };
+    let map = &textures[texture.0];
+    let at = transform.apply(uv);
+    let value = |uv: Vec2| map.sample(uv.to_array())[*channel];
+    let (width, height) = (map.width() as f32, map.height() as f32);
+    // Derivatives by the texture's own uv, then by the chain rule.
+    let [left, right] = centres_around(at.x, width);
+    let du = (value(Vec2::new(right, at.y)) - value(Vec2::new(left, at.y))) * width;
+    let [below, above] = centres_around(at.y, height);
+    let dv = (value(Vec2::new(at.x, above)) - value(Vec2::new(at.x, below))) * height;
+    let rows = &transform.0;
+    Vec2::new(du * rows[0][0] + dv * rows[1][0], du * rows[0][1] + dv * rows[1][1])
+}
+
+/// The centres of the two texels around a coordinate, for `count` texels between 0 and 1.
+fn centres_around(at: f32, count: f32) -> [f32; 2] {
+    let lower = (at * count - 0.5).floor();
+    [(lower + 0.5) / count, (lower + 1.5) / count]
 }

@@ -1,37 +1,32 @@
-//! Checks materials and precomputes the tables that some of them need.
+//! Checks materials, precomputes the tables that some of them need, and measures the share of light that they reflect.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::material::{
     ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
 };
 use mateval_scene::reference::{MaterialIndex, ReferenceScene};
 
-use super::fresnel::{self, eta_from_specular};
-use super::principled_tables::BlenderTables;
-use super::rough_boundary::{RoughCoat, Widths};
+use super::albedo_tables::{BlenderTables, RoughCoat, Table, Widths};
+use super::facets::{diffuse_reflectance, eta_from_specular};
+use super::lobe::Lobe;
 use crate::error::{MaterialFault, SceneFault};
 
-/// One table per material.
 #[derive(Debug)]
 pub(crate) struct MaterialTables(Vec<Table>);
 
-/// The precomputed values of one material.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Table {
-    /// For Blender's principled.
-    pub(crate) reflection: Option<Arc<BlenderTables>>,
-    /// For rough plastic.
-    pub(crate) coat: Option<Arc<RoughCoat>>,
-    /// For smooth plastic: the fraction of uniform light from inside that its coat reflects back.
-    pub(crate) inside: f32,
+/// Measures materials, to compare the energy of two models. Tables that depend on the same parameters are computed once.
+#[derive(Default)]
+pub struct ReflectanceMeter {
+    known: Known,
 }
 
 /// The tables computed so far, by the parameters that they depend on.
 #[derive(Default)]
-pub(super) struct Known {
+struct Known {
     /// Keyed by the bits of eta.
     reflections: BTreeMap<u32, Arc<BlenderTables>>,
     /// Keyed by whether the distribution is GGX, the bits of eta, and the bits of alpha if that is constant.
@@ -57,10 +52,10 @@ impl MaterialTables {
     }
 }
 
-pub(super) fn table(material: &Material, known: &mut Known) -> Table {
+fn table(material: &Material, known: &mut Known) -> Table {
     match &material.model {
         MaterialModel::Plastic { eta, microfacets: None, .. } => {
-            Table { inside: fresnel::diffuse_reflectance(1.0 / eta), ..Table::default() }
+            Table { inside: diffuse_reflectance(1.0 / eta), ..Table::default() }
         }
         MaterialModel::Plastic { eta, microfacets: Some(microfacets), .. } => {
             Table { coat: Some(known.coat(*eta, microfacets)), ..Table::default() }
@@ -91,7 +86,7 @@ impl Known {
 }
 
 /// Fails unless every constant is finite, every index of refraction above 0, and every texture and channel exist.
-pub(super) fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
+fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
     let inputs = material.model.inputs();
     for eta in inputs.etas {
         if !(eta.is_finite() && eta > 0.0) {
@@ -131,4 +126,99 @@ fn check_texture(texture: usize, count: usize) -> Result<(), MaterialFault> {
 
 fn check_number(value: f32) -> Result<(), MaterialFault> {
     if value.is_finite() { Ok(()) } else { Err(MaterialFault::NotFinite(value)) }
+}
+
+/// Directions of the viewer.
+const VIEWERS: u32 = 64;
+/// Samples for each direction of the viewer.
+const SAMPLES: u32 = 1024;
+/// Powers of the inverse of the root of x^4 = x + 1: the additive sequence of lowest discrepancy in three dimensions
+/// (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+const STEPS: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_2, 0.549_700_477_901_970_5];
+
+impl ReflectanceMeter {
+    /// The share of light that a surface reflects, per channel, if the same radiance arrives from all directions above
+    /// it. `model` has no textures. Dielectrics count what they transmit, too.
+    ///
+    /// Fails if a parameter is out of range or needs a texture.
+    pub fn uniform(&mut self, model: &MaterialModel) -> Result<[f64; 3], MaterialFault> {
+        let model = *model;
+        let material = Material { name: String::new(), model, two_sided: true, opacity: None, bump: None };
+        check(&material, 0)?;
+        let table = table(&material, &mut self.known);
+        let lobe = Lobe::at(&material, &table, &[], Vec2::ZERO);
+        let mut sum = [0.0_f64; 3];
+        for viewer in 0..VIEWERS {
+            // Equal steps of the squared cosine have equal weights of the cosine.
+            let cos2 = (f64::from(viewer) + 0.5) / f64::from(VIEWERS);
+            let wo = Vec3::new((1.0 - cos2).sqrt() as f32, 0.0, cos2.sqrt() as f32);
+            for sample in 0..SAMPLES {
+                let number = f64::from(viewer * SAMPLES + sample);
+                // A value just below 1 would become 1 as f32.
+                let u = STEPS.map(|step| (((number + 0.5) * step).fract() as f32).min(1.0 - f32::EPSILON));
+                if let Some(found) = lobe.sample(wo, u) {
+                    sum.iter_mut().zip(found.weight.to_array()).for_each(|(sum, weight)| *sum += f64::from(weight));
+                }
+            }
+        }
+        Ok(sum.map(|sum| sum / f64::from(VIEWERS * SAMPLES)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::material::{ConductorIor, TextureIndex};
+
+    use super::*;
+
+    fn conductor(ior: ConductorIor, alpha: f32) -> MaterialModel {
+        let specular_reflectance = ColorInput::Constant([1.0; 3]);
+        let alpha = ScalarInput::Constant(alpha);
+        let microfacets = Some(Microfacets { distribution: Distribution::Ggx, alpha });
+        MaterialModel::Conductor { ior, specular_reflectance, microfacets }
+    }
+
+    /// Matt surfaces reflect their reflectance. A smooth black plastic of index 1.5 reflects 0.0918 (Egan and Hilgeman 1973,
+    /// table), and a conductor without absorption the same.
+    #[test]
+    fn known_shares() {
+        let mut meter = ReflectanceMeter::default();
+        let color = ColorInput::Constant([0.2, 0.5, 0.7]);
+        let found = meter.uniform(&MaterialModel::Diffuse { reflectance: color, alpha: None }).unwrap();
+        assert!(
+            found.iter().zip([0.2, 0.5, 0.7]).all(|(found, expected)| (found - expected).abs() < 1e-5),
+            "{found:?}"
+        );
+        let black = MaterialModel::Plastic {
+            eta: 1.5,
+            nonlinear: true,
+            diffuse_reflectance: ColorInput::Constant([0.0; 3]),
+            specular_reflectance: ColorInput::Constant([1.0; 3]),
+            microfacets: None,
+        };
+        let glass = ConductorIor::EtaK { eta: [1.5; 3], k: [0.0; 3] };
+        for model in [black, conductor(glass, 1e-3)] {
+            let found = meter.uniform(&model).unwrap()[0];
+            assert!((found - 0.0918).abs() < 1e-3, "{found}");
+        }
+    }
+
+    /// Rough mirrors lose the light that hits a second facet: 1 - 0.971 at alpha 0.1 (GGX), 1 - 0.689 at 0.5, which Heitz et
+    /// al., "Multiple-Scattering Microfacet BSDFs" (2016), show as the darkening of rough conductors.
+    #[test]
+    fn rough_mirrors_lose_light() {
+        let mut meter = ReflectanceMeter::default();
+        let shares = [0.02, 0.1, 0.25, 0.5]
+            .map(|alpha| meter.uniform(&conductor(ConductorIor::PerfectMirror, alpha)).unwrap()[1]);
+        assert!(shares[0] > 0.99 && shares[3] > 0.6 && shares.windows(2).all(|pair| pair[0] > pair[1]), "{shares:?}");
+    }
+
+    #[test]
+    fn textures_and_parameters_out_of_range_are_refused() {
+        let mut meter = ReflectanceMeter::default();
+        let reflectance = ColorInput::Texture { texture: TextureIndex(0), uv: Default::default() };
+        assert!(meter.uniform(&MaterialModel::Diffuse { reflectance, alpha: None }).is_err());
+        let reflectance = ColorInput::Constant([f32::NAN; 3]);
+        assert!(meter.uniform(&MaterialModel::Diffuse { reflectance, alpha: None }).is_err());
+    }
 }

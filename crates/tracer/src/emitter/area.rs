@@ -2,16 +2,15 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use mateval_image::{Texels, Texture};
 use mateval_scene::TriangleMesh;
-use mateval_scene::reference::{LightIndex, ReferenceScene, SurfaceIndex};
+use mateval_scene::material::UvTransform;
+use mateval_scene::reference::{EmissionMap, LightIndex, ReferenceScene, SurfaceIndex};
 
-use super::distribution::Distribution;
-use super::radiance_map::RadianceMap;
-use crate::accel::TriangleIndex;
-use crate::surface_hit::SurfaceHit;
-use crate::triangle_record::TriangleRecord;
-use crate::warp;
+use crate::error::LightFault;
+use crate::ray::{SurfaceHit, TriangleIndex, TriangleRecord};
+use crate::sampling::{self, Distribution};
 
 /// What surfaces emit.
 #[derive(Clone, Debug)]
@@ -198,7 +197,7 @@ impl AreaEmitter {
         let which = self.starts.partition_point(|&start| start <= triangle) - 1;
         let index = TriangleIndex(triangle - self.starts[which]);
         let surface = self.surfaces.get(which).copied().unwrap_or(STAGE);
-        SurfaceHit::new(surface, index, &self.records[triangle], warp::triangle(u))
+        SurfaceHit::new(surface, index, &self.records[triangle], sampling::triangle(u))
     }
 
     /// The point on a stage light that a ray has hit.
@@ -248,4 +247,43 @@ fn bounding_sphere(meshes: &[&TriangleMesh]) -> (Vec3, f32) {
 fn common_normal(records: &[TriangleRecord]) -> Option<Vec3> {
     let first = records.first()?.normal;
     records.iter().all(|record| record.normal.dot(first) > 0.9999).then_some(first)
+}
+
+/// A factor on the radiance of an emitting surface, looked up at the surface's uv.
+#[derive(Clone, Debug)]
+pub(crate) struct RadianceMap {
+    texture: Texture,
+    uv: UvTransform,
+}
+
+impl RadianceMap {
+    /// Fails if the texture does not exist, if the uv transform is not finite, or if a texel is negative or not finite.
+    pub(crate) fn new(map: &EmissionMap, textures: &[Texture]) -> Result<Self, LightFault> {
+        let index = map.texture.0;
+        let missing = LightFault::MissingTexture { texture: index, count: textures.len() };
+        let texture = textures.get(index).ok_or(missing)?;
+        if !map.uv.0.as_flattened().iter().all(|v| v.is_finite()) {
+            return Err(LightFault::MapTransform(map.uv.0));
+        }
+        if let Some(value) = first_unsound(texture) {
+            return Err(LightFault::MapValue { texture: index, value });
+        }
+        Ok(Self { texture: texture.clone(), uv: map.uv })
+    }
+
+    /// Not inlined, since most lamps have no map.
+    #[inline(never)]
+    pub(crate) fn at(&self, uv: Vec2) -> Vec3 {
+        Vec3::from_array(self.texture.sample(self.uv.apply(uv).to_array()))
+    }
+}
+
+/// The first value that is negative or not finite and so cannot scale light. Integer texels are always valid.
+fn first_unsound(texture: &Texture) -> Option<f32> {
+    let unsound = |values: &[f32]| values.iter().copied().find(|v| !(v.is_finite() && *v >= 0.0));
+    match texture.texels() {
+        Texels::Linear(v) => unsound(v.as_flattened()),
+        Texels::Grey(v) => unsound(v),
+        Texels::Srgb8(_) | Texels::Srgb16(_) | Texels::Linear8(_) | Texels::Grey8(_) => None,
+    }
 }

@@ -5,8 +5,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{Mat3, Vec3};
 use mateval_image::{LinearRgb, Texture};
 
-use super::distribution::Distribution;
-use crate::warp;
+use crate::sampling;
+use crate::sampling::Distribution;
 
 /// An environment map, importance-sampled by its brightness.
 ///
@@ -112,7 +112,7 @@ fn row_area(texture: &Texture, y: usize) -> f32 {
 
 /// A uniform direction and its density.
 pub(crate) fn sample_constant(u: [f32; 2]) -> (Vec3, f32) {
-    (warp::sphere(u), CONSTANT_DENSITY)
+    (sampling::sphere(u), CONSTANT_DENSITY)
 }
 
 /// The density of [`sample_constant`].

@@ -7,11 +7,8 @@
 //! change how often each is chosen (`group_shares`).
 
 mod area;
-mod distribution;
 mod environment;
-mod escape;
 pub mod group_shares;
-mod radiance_map;
 
 use std::sync::Arc;
 
@@ -22,12 +19,10 @@ use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceInde
 
 use crate::accel::Accel;
 use crate::error::{LightFault, RequestFault, SceneFault, TracerError};
-use crate::ray::Ray;
-use crate::surface_hit::SurfaceHit;
-use area::{AreaEmitter, LANES, Outlines, SurfaceEmission};
+use crate::ray::{Ray, SurfaceHit};
+use crate::sampling::{self, Frame, Sampler};
+use area::{AreaEmitter, LANES, Outlines, RadianceMap, SurfaceEmission};
 use environment::EnvironmentMap;
-pub(crate) use escape::escape_share;
-use radiance_map::RadianceMap;
 
 /// The emitters of all light groups of a scene.
 #[derive(Clone, Debug)]
@@ -66,7 +61,6 @@ enum DistantKind {
 /// Light that arrives along a sampled direction unless something blocks it.
 #[derive(Clone, Copy, Debug)]
 pub struct EmitterSample {
-    /// The light group.
     pub light: LightIndex,
     /// Towards the emitter, unit length.
     pub direction: Vec3,
@@ -93,7 +87,6 @@ pub struct StageLight {
 /// Radiance that a ray has met by chance.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitted {
-    /// The light group.
     pub light: LightIndex,
     /// Linear Rec. 709.
     pub radiance: Vec3,
@@ -462,5 +455,112 @@ fn check_radiance(radiance: &[f32; 3]) -> Result<(), LightFault> {
     if sound { Ok(()) } else { Err(LightFault::Radiance(*radiance)) }
 }
 
+/// The number of walks, in turn from all area emitters.
+const WALKS: u32 = 1024;
+/// The largest number of rays of a walk. The first one leaves the lamp and does not count.
+const RAYS: u32 = 5;
+const SEED: u64 = 0xe5_ca9e;
+
+/// The share of rays that leave the scene, among those from surfaces on which the area emitters shine, or on which light
+/// from there arrives; 1 if there are no area emitters. `first_opaque` finds the first surface in a direction that light
+/// does not pass.
+///
+/// Probe walks start on the area emitters, reflect diffusely where they hit and go straight through glass. They follow
+/// from geometry and opacity alone, and always use the same random numbers.
+pub(crate) fn escape_share(emitters: &Emitters, first_opaque: impl Fn(&SurfaceHit, Vec3) -> Option<SurfaceHit>) -> f32 {
+    if emitters.areas.is_empty() {
+        return 1.0;
+    }
+    let (mut escaped, mut counted) = (0_u32, 0_u32);
+    for walk in 0..WALKS {
+        let sampler = Sampler::new(SEED, [0, 0], walk);
+        let [choice, u, v, side] = sampler.set(0);
+        let lamp = &emitters.areas[walk as usize % emitters.areas.len()];
+        let mut at = lamp.sample(choice, [u, v]);
+        let mut up = side < 0.5 || !lamp.is_two_sided();
+        for ray in 0..RAYS {
+            let [u, v, ..] = sampler.set(1 + ray);
+            let normal = if up { at.geometric_normal } else { -at.geometric_normal };
+            let direction = Frame::around(normal).world_from_local(sampling::cosine_hemisphere([u, v]));
+            let met = first_opaque(&at, direction);
+            if ray > 0 {
+                counted += 1;
+                escaped += u32::from(met.is_none());
+            }
+            let Some(met) = met else { break };
+            up = met.is_front(-direction);
+            at = met;
+        }
+    }
+    escaped as f32 / counted.max(1) as f32
+}
+
 #[cfg(test)]
-mod tests;
+mod tests {
+    use mateval_scene::reference::{LightGroup, MaterialIndex, Surface};
+
+    use super::*;
+
+    fn triangle(at: Vec3, size: f32) -> Surface {
+        let positions = vec![at, at + Vec3::X * size, at + Vec3::Y * size];
+        let mesh = TriangleMesh { positions, triangles: vec![[0, 1, 2]], ..Default::default() };
+        Surface { name: String::new(), mesh, material: MaterialIndex(0) }
+    }
+
+    fn emitters(surfaces: usize, distant: bool) -> (ReferenceScene, Emitters) {
+        let mut scene = ReferenceScene::default();
+        let mut light = |emission: Emission| {
+            scene.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
+        };
+        for k in 0..surfaces {
+            let surfaces = vec![SurfaceIndex(k)];
+            light(Emission::Area { surfaces, radiance: [1.0; 3], map: None, two_sided: k % 2 == 0 });
+        }
+        if distant {
+            light(Emission::Constant { radiance: [1.0; 3] });
+            light(Emission::Constant { radiance: [2.0; 3] });
+        }
+        let place = |k: usize| triangle(Vec3::new(k as f32 - 2.0, 0.3 * k as f32, -3.0), 0.2 + 0.2 * k as f32);
+        scene.surfaces = (0..surfaces).map(place).collect();
+        let emitters = Emitters::new(&scene, &[], 5.0).unwrap();
+        (scene, emitters)
+    }
+
+    /// The density of a sample equals the density reported when the same light is met by chance, for all mixes of
+    /// emitters, whether surfaces are sampled one by one or by group.
+    #[test]
+    fn sampled_and_found_densities_agree() {
+        for (surfaces, distant) in [(1, false), (5, false), (5, true), (70, true), (0, true)] {
+            let (scene, emitters) = emitters(surfaces, distant);
+            let from = Vec3::new(0.2, -0.1, 0.5);
+            let shares: Vec<f64> = (0..scene.lights.len()).map(|light| 1.0 + light as f64).collect();
+            for emitters in [emitters.with_group_shares(&[from, Vec3::ZERO], &shares), emitters] {
+                let mut lights = std::collections::BTreeSet::new();
+                for index in 0..2000 {
+                    let [a, b, c, _] = sobol_burley::sample_4d(index, 0, 3);
+                    let Some(sample) = emitters.sample(from, [a, b, c], |_| 1.0) else { continue };
+                    let found = match &sample.place {
+                        Some(place) => emitters.emitted(place, from).unwrap(),
+                        None => emitters.from_outside(sample.direction).find(|f| f.light == sample.light).unwrap(),
+                    };
+                    assert!((found.density / sample.density - 1.0).abs() < 1e-3, "{surfaces} {sample:?} {found:?}");
+                    assert_eq!((found.light, found.radiance), (sample.light, sample.radiance));
+                    lights.insert(sample.light.0);
+                }
+                // Of many emitters, some are too small to be found.
+                assert!(
+                    lights.len() == scene.lights.len() || (surfaces == 70 && lights.len() > 60),
+                    "{}",
+                    lights.len()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_emitters_give_no_light() {
+        let (_, emitters) = emitters(0, false);
+        assert!(emitters.sample(Vec3::ZERO, [0.5; 3], |_| 1.0).is_none());
+        assert_eq!(emitters.from_outside(Vec3::X).count(), 0);
+    }
+}

@@ -1,30 +1,69 @@
 //! Several views with a common centre, rendered from one set of paths.
 //!
 //! Radiance along a direction is the same in every view from one centre. So paths are distributed once over the union
-//! of the views' pictures, on the image plane of the first camera (`plane`), evenly (`cell_points`), and added to every
-//! view that contains their direction (`splat`). In each view a path has the weight of the picture area it represents:
-//! the Jacobian between the two planes over the known number of samples. Nothing is divided by sums of weights, so the
-//! expectation of every pixel is its radiance under a box filter of one pixel.
+//! of the views' pictures, on the image plane of the first camera, evenly (`plane`), and added to every view that
+//! contains their direction. In each view a path has the weight of the picture area it represents: the Jacobian between
+//! the two planes over the known number of samples. Nothing is divided by sums of weights, so the expectation of every
+//! pixel is its radiance under a box filter of one pixel.
 
-mod cell_points;
-mod job;
-mod lighting;
 mod plane;
-mod splat;
-mod view_light;
 
+use std::array::from_fn;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::Vec3;
+use mateval_image::Picture;
 use mateval_scene::Camera;
+use mateval_scene::reference::LightIndex;
+use rayon::prelude::*;
 
-use crate::error::TracerError;
-use crate::light_basis::LightGroups;
-use crate::material_source::OwnMaterials;
-use crate::settings::RenderSettings;
+use crate::error::{RequestFault, TracerError};
+use crate::light_basis::{LightBasis, LightGroups};
+use crate::path::{MaterialSource, OwnMaterials, PathCounts, PathTracer, RenderSettings};
+use crate::ray::Ray;
+use crate::render::{self, RenderStats};
+use crate::sampling::Sampler;
 use crate::world::World;
-use job::planes;
-pub(crate) use job::{Progress, ViewsJob};
-pub use lighting::{LightMix, Lighting};
-pub(crate) use splat::Subject;
-pub use view_light::{HalfLight, ViewLight, ViewsRender};
+use plane::{Numbering, Plane, PlaneView, Window, cell_points};
+
+/// The pictures made from a view's light.
+#[derive(Clone, Copy, Debug)]
+pub enum Lighting<'a> {
+    /// One per group of lights, under the scene's own radiances.
+    Apart(&'a LightGroups),
+    /// For each prediction (or material variant) the same number of mixes, one picture each.
+    Mixed(&'a [Vec<LightMix>]),
+}
+
+/// For each light a factor on its radiance, per channel, at least 0.
+pub type LightMix = Vec<[f64; 3]>;
+
+/// The views of one world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewsRender {
+    /// In the order of the cameras.
+    pub views: Vec<ViewLight>,
+    /// The number of path sets per seed: 1 if the views share a centre, otherwise one per view.
+    pub passes: usize,
+    /// Counts over all passes and seeds.
+    pub stats: RenderStats,
+}
+
+/// The light that one camera sees, in independent halves (or as many parts as there were seeds).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewLight {
+    /// In the order of the seeds.
+    pub halves: Vec<HalfLight>,
+}
+
+/// One of several independent estimates of a view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HalfLight {
+    /// Linear radiance: one picture per group of lights, or per mix of lights, by [`Lighting`].
+    pub basis: LightBasis,
+    /// The number of paths that each pixel received.
+    pub counts: Picture<u32>,
+}
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
 ///
@@ -56,4 +95,465 @@ pub fn render_views(
 /// A camera belongs to the first group that will have it, so that cameras from elsewhere never change a group.
 pub fn groups_with_one_centre(cameras: &[Camera]) -> Vec<Vec<usize>> {
     planes(cameras, 1).into_iter().map(|group| group.views).collect()
+}
+
+/// The scene to expose: a world with some materials and lighting.
+#[derive(Clone, Copy)]
+pub(crate) struct Subject<'a, M> {
+    pub(crate) world: &'a World,
+    pub(crate) materials: M,
+    /// The first of the material variants to trace.
+    pub(crate) first: usize,
+    /// The number of variants whose pictures are kept, at most `K`: the others only fill up the tracer's lanes.
+    pub(crate) variants: usize,
+    pub(crate) lighting: Lighting<'a>,
+}
+
+/// Views to be rendered.
+pub(crate) struct ViewsJob<'a, M> {
+    pub(crate) subject: Subject<'a, M>,
+    pub(crate) cameras: &'a [Camera],
+    pub(crate) settings: &'a RenderSettings,
+    pub(crate) seeds: &'a [u64],
+}
+
+/// Counts finished tiles and reports them.
+pub(crate) struct Progress<'a> {
+    finished: AtomicUsize,
+    total: usize,
+    report: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+impl<'a> Progress<'a> {
+    /// `report` is called with the number of finished tiles and `total`.
+    pub(crate) fn new(total: usize, report: &'a (dyn Fn(usize, usize) + Sync)) -> Self {
+        Self { finished: AtomicUsize::new(0), total, report }
+    }
+
+    fn advance(&self) {
+        (self.report)(self.finished.fetch_add(1, Ordering::Relaxed) + 1, self.total);
+    }
+}
+
+impl<'a, M: Copy> ViewsJob<'a, M> {
+    /// Checks the arguments, for `variants` material variants, and returns the planes to expose.
+    pub(crate) fn planes(&self, variants: usize) -> Result<Vec<SharedPlane>, TracerError> {
+        self.settings.check()?;
+        self.subject.lighting.check(self.subject.world.emitters().groups(), variants)?;
+        check_seeds(self.seeds)?;
+        Ok(planes(self.cameras, self.settings.samples))
+    }
+
+    /// The number of tiles that [`Self::render`] exposes.
+    pub(crate) fn tiles(&self, planes: &[SharedPlane]) -> usize {
+        self.seeds.len() * planes.iter().map(|shared| shared.plane.tiles().len()).sum::<usize>()
+    }
+
+    /// Renders the views for the subject's material variants, which share their paths and are at most `K`.
+    pub(crate) fn render<const K: usize>(&self, planes: &[SharedPlane], progress: &Progress<'_>) -> Vec<ViewsRender>
+    where
+        M: MaterialSource<'a, K> + Sync,
+    {
+        let done = || progress.advance();
+        let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
+        let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.subject.variants];
+        let mut counts = Vec::new();
+        // Expose every plane once per seed.
+        for &seed in self.seeds {
+            let settings = RenderSettings { seed, ..*self.settings };
+            for shared in planes {
+                let of_views = expose::<_, K>(self.subject, &shared.plane, &settings, &mut counts, &done);
+                for (view, halves) in shared.views.iter().zip(of_views) {
+                    for (views, half) in views.iter_mut().zip(halves) {
+                        views[*view].halves.push(half);
+                    }
+                }
+            }
+        }
+        // Attach the counts of each variant.
+        let of_variant = |(variant, views): (usize, Vec<ViewLight>)| ViewsRender {
+            views,
+            passes: planes.len(),
+            stats: stats(&counts, variant),
+        };
+        views.into_iter().enumerate().map(of_variant).collect()
+    }
+}
+
+/// A plane, and which cameras see it.
+#[derive(Clone, Debug)]
+pub(crate) struct SharedPlane {
+    plane: Plane,
+    /// Indices of the cameras, in the order of the plane's views.
+    views: Vec<usize>,
+}
+
+/// A plane for each group of cameras with one centre.
+fn planes(cameras: &[Camera], samples: u32) -> Vec<SharedPlane> {
+    let mut groups: Vec<SharedPlane> = Vec::new();
+    for (view, camera) in cameras.iter().enumerate() {
+        let joined = groups.iter_mut().find_map(|group| Some((group.plane.with(camera)?, group)));
+        match joined {
+            Some((plane, group)) => {
+                group.plane = plane;
+                group.views.push(view);
+            }
+            None => groups.push(SharedPlane { plane: Plane::alone(camera, samples), views: vec![view] }),
+        }
+    }
+    groups
+}
+
+fn check_seeds(seeds: &[u64]) -> Result<(), RequestFault> {
+    let twice = seeds.iter().enumerate().find(|(place, seed)| seeds[..*place].contains(seed));
+    match twice {
+        Some((_, seed)) => Err(RequestFault::RepeatedSeed(*seed)),
+        None => Ok(()),
+    }
+}
+
+fn stats(tiles: &[TileCounts], variant: usize) -> RenderStats {
+    let paths: Vec<PathCounts> = tiles.iter().map(|tile| tile.path).collect();
+    render::stats(tiles.iter().map(|tile| tile.paths).sum(), &paths, variant)
+}
+
+impl Lighting<'_> {
+    /// The number of pictures per view.
+    fn pictures(&self) -> usize {
+        match self {
+            Self::Apart(groups) => groups.groups().len(),
+            Self::Mixed(mixes) => mixes.first().map_or(0, Vec::len),
+        }
+    }
+
+    /// Fails unless the lights number `lights` and the mixes `variants`, with finite weights of at least 0.
+    fn check(&self, lights: usize, variants: usize) -> Result<(), RequestFault> {
+        let mixes = match self {
+            Self::Apart(groups) if groups.lights() == lights => return Ok(()),
+            Self::Apart(groups) => {
+                return Err(RequestFault::GroupedLights { found: groups.lights(), expected: lights });
+            }
+            Self::Mixed(mixes) => *mixes,
+        };
+        if mixes.len() != variants {
+            return Err(RequestFault::MixedPredictions { found: mixes.len(), expected: variants });
+        }
+        let expected = self.pictures();
+        if let Some(prediction) = mixes.iter().position(|mixes| mixes.len() != expected) {
+            return Err(RequestFault::MixCount { prediction, found: mixes[prediction].len(), expected });
+        }
+        mixes.iter().flatten().try_for_each(|mix| check_mix(mix, lights))
+    }
+}
+
+fn check_mix(mix: &LightMix, lights: usize) -> Result<(), RequestFault> {
+    if mix.len() != lights {
+        return Err(RequestFault::WeightCount { found: mix.len(), expected: lights });
+    }
+    for (light, weights) in mix.iter().enumerate() {
+        if let Some(&found) = weights.iter().find(|weight| !(weight.is_finite() && **weight >= 0.0)) {
+            return Err(RequestFault::Weight { light: LightIndex(light), found });
+        }
+    }
+    Ok(())
+}
+
+/// Counts of what happened in one tile.
+#[derive(Clone, Copy, Debug, Default)]
+struct TileCounts {
+    paths: u64,
+    path: PathCounts,
+}
+
+/// Tiles exposed per thread before they are merged. More tiles keep threads busier at the end of a batch and take more
+/// memory.
+const TILES_A_THREAD: usize = 4;
+
+/// Exposes all views of `plane` with the seed of `settings`, per variant. Appends the counts of each tile to `counts`.
+fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
+    subject: Subject<'w, M>,
+    plane: &Plane,
+    settings: &RenderSettings,
+    counts: &mut Vec<TileCounts>,
+    done: &(impl Fn() + Sync),
+) -> Vec<Vec<HalfLight>> {
+    let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
+    let mut films = exposure.blank_films();
+    // Tiles are merged in their own order, whichever finishes first; batches limit how many wait in memory.
+    for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
+        let exposed: Vec<ExposedTile<K>> = batch
+            .par_iter()
+            .map(|tile| {
+                let exposed = exposure.tile(tile);
+                done();
+                exposed
+            })
+            .collect();
+        for tile in exposed {
+            counts.push(tile.counts);
+            for (film, part) in films.iter_mut().zip(tile.parts) {
+                part.into_iter().for_each(|part| part.merge_into(film));
+            }
+        }
+    }
+    films
+}
+
+struct Exposure<'w, 'a, M> {
+    subject: Subject<'w, M>,
+    plane: &'a Plane,
+    settings: &'a RenderSettings,
+    numbering: Numbering,
+}
+
+/// The contribution of a tile to every view that sees some of it.
+struct ExposedTile<const K: usize> {
+    parts: Vec<Option<Part<K>>>,
+    counts: TileCounts,
+}
+
+/// A rectangle of one view: sums for all its pictures, pixel by pixel and variant by variant.
+struct Part<const K: usize> {
+    window: Window,
+    sums: Vec<[[f64; 3]; K]>,
+    counts: Vec<u32>,
+}
+
+/// The number of paths traced together; slightly more if a cell has several.
+const BATCH: usize = 256;
+
+/// A path through one of the plane's cells.
+struct PlanePath {
+    cell: [i32; 2],
+    /// Its index among the paths of the cell.
+    rank: u32,
+    point: [f32; 2],
+    /// The number of paths in the cell.
+    count: usize,
+}
+
+/// The light that a path has found from one light, per variant.
+struct Contribution<const K: usize> {
+    path: usize,
+    light: LightIndex,
+    values: [Vec3; K],
+}
+
+/// Buffers for exposing one tile.
+struct TileTracer<'w, 'a, M, const K: usize> {
+    exposure: &'a Exposure<'w, 'a, M>,
+    tracer: PathTracer<'w, M, K>,
+    paths: Vec<PlanePath>,
+    contributions: Vec<Contribution<K>>,
+    found: PathLight<K>,
+}
+
+/// The light found by one path, per variant.
+struct PathLight<const K: usize> {
+    /// By picture.
+    sums: Vec<[[f64; 3]; K]>,
+    /// The pictures that have received light, in order of their first contribution.
+    touched: Vec<usize>,
+    /// By light, of which there are few on one path: what is mixed to pictures when all of it is known.
+    lights: Vec<(LightIndex, [[f64; 3]; K])>,
+}
+
+impl<'w, M: Copy> Exposure<'w, '_, M> {
+    fn pictures(&self) -> usize {
+        self.subject.lighting.pictures()
+    }
+
+    fn blank_films(&self) -> Vec<Vec<HalfLight>> {
+        let blank = |(width, height): (usize, usize)| HalfLight {
+            basis: LightBasis::black(width, height, self.pictures()),
+            counts: Picture::filled(width, height, 0),
+        };
+        let size = |view: &PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
+        self.plane.views().iter().map(size).map(|size| vec![blank(size); self.subject.variants]).collect()
+    }
+
+    fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
+    where
+        M: MaterialSource<'w, K>,
+    {
+        let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.pictures()));
+        let parts = (0..self.plane.views().len()).map(part).collect();
+        let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
+        let mut tile_tracer = TileTracer::new(self);
+        let mut points = Vec::new();
+        for cell in tile.cells() {
+            cell_points(self.settings.seed, cell, self.plane.paths(cell), &mut points);
+            for (rank, &point) in points.iter().enumerate() {
+                tile_tracer.paths.push(PlanePath { cell, rank: rank as u32, point, count: points.len() });
+            }
+            if tile_tracer.paths.len() >= BATCH {
+                tile_tracer.develop(&mut exposed);
+            }
+        }
+        tile_tracer.develop(&mut exposed);
+        exposed.counts.path = tile_tracer.tracer.counts;
+        exposed
+    }
+
+    fn start(&self, path: &PlanePath) -> (Sampler, Ray) {
+        let camera = self.plane.camera();
+        let direction = camera.direction(self.plane.ray_place(path.cell, path.point));
+        let ray = Ray::endless(camera.position().as_vec3(), direction.as_vec3());
+        (self.numbering.path_sampler(self.settings.seed, path.cell, path.rank), ray)
+    }
+
+    /// Adds the light of a path to the views that see it.
+    fn splat<const K: usize>(&self, path: &PlanePath, found: &PathLight<K>, parts: &mut [Option<Part<K>>]) {
+        let at = self.plane.ray_place(path.cell, path.point);
+        for (view, part) in self.plane.views().iter().zip(parts) {
+            let Some(part) = part else { continue };
+            let Some(seen) = self.plane.seen(view, at) else { continue };
+            if let Some(pixel) = part.pixel(seen.place.x, seen.place.y) {
+                part.add(pixel, found, seen.pixels / path.count as f64);
+            }
+        }
+    }
+}
+
+impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> {
+    fn new(exposure: &'a Exposure<'w, 'a, M>) -> Self {
+        let Subject { world, materials, .. } = exposure.subject;
+        Self {
+            exposure,
+            tracer: PathTracer::new(world, materials, *exposure.settings),
+            paths: Vec::new(),
+            contributions: Vec::new(),
+            found: PathLight {
+                sums: vec![[[0.0; 3]; K]; exposure.pictures()],
+                touched: Vec::new(),
+                lights: Vec::new(),
+            },
+        }
+    }
+
+    /// Traces the waiting paths and adds their light to the tile's views, path by path.
+    fn develop(&mut self, exposed: &mut ExposedTile<K>) {
+        let Self { exposure, tracer, paths, contributions, found } = self;
+        let starts = paths.iter().map(|path| exposure.start(path));
+        tracer.trace(starts, |path, light, values| contributions.push(Contribution { path, light, values }));
+        let lighting = &exposure.subject.lighting;
+        let first = exposure.subject.first;
+        // Paths were traced together; the stable sort keeps the contributions of each path in their order.
+        contributions.sort_by_key(|contribution| contribution.path);
+        let mut rest = contributions.as_slice();
+        for (which, path) in paths.iter().enumerate() {
+            let (own, others) = rest.split_at(rest.partition_point(|contribution| contribution.path == which));
+            rest = others;
+            own.iter().for_each(|contribution| found.add(lighting, contribution));
+            found.mix(lighting, first);
+            exposure.splat(path, found, &mut exposed.parts);
+            found.clear();
+        }
+        exposed.counts.paths += paths.len() as u64;
+        paths.clear();
+        contributions.clear();
+    }
+}
+
+impl<const K: usize> PathLight<K> {
+    fn add(&mut self, lighting: &Lighting<'_>, contribution: &Contribution<K>) {
+        let values = contribution.values.map(|value| value.to_array().map(f64::from));
+        let sums = match lighting {
+            Lighting::Apart(groups) => {
+                let group = groups.of(contribution.light);
+                self.touch(group);
+                &mut self.sums[group]
+            }
+            Lighting::Mixed(_) => self.of_light(contribution.light),
+        };
+        sums.iter_mut().zip(values).for_each(|(sum, value)| add(sum, value, 1.0));
+    }
+
+    fn of_light(&mut self, light: LightIndex) -> &mut [[f64; 3]; K] {
+        let known = self.lights.iter().position(|(known, _)| *known == light);
+        let at = known.unwrap_or_else(|| {
+            self.lights.push((light, [[0.0; 3]; K]));
+            self.lights.len() - 1
+        });
+        &mut self.lights[at].1
+    }
+
+    /// Mixes what each light brought to pictures.
+    fn mix(&mut self, lighting: &Lighting<'_>, first: usize) {
+        let Lighting::Mixed(mixes) = lighting else { return };
+        if self.lights.is_empty() {
+            return;
+        }
+        for (picture, sums) in self.sums.iter_mut().enumerate() {
+            self.touched.push(picture);
+            for (light, values) in &self.lights {
+                for (k, (sum, value)) in sums.iter_mut().zip(values).enumerate() {
+                    // Variants beyond the last repeat it.
+                    let weight = mixes[(first + k).min(mixes.len() - 1)][picture][light.0];
+                    add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
+                }
+            }
+        }
+        self.lights.clear();
+    }
+
+    fn touch(&mut self, picture: usize) {
+        if !self.touched.contains(&picture) {
+            self.touched.push(picture);
+        }
+    }
+
+    fn clear(&mut self) {
+        for group in self.touched.drain(..) {
+            self.sums[group] = [[0.0; 3]; K];
+        }
+    }
+}
+
+impl<const K: usize> Part<K> {
+    fn new(window: Window, groups: usize) -> Self {
+        let area = window.area();
+        Self { window, sums: vec![[[0.0; 3]; K]; area * groups], counts: vec![0; area] }
+    }
+
+    /// The index within the rectangle of the pixel that contains (x, y), or `None` outside.
+    fn pixel(&self, x: f64, y: f64) -> Option<usize> {
+        let (x, y) = (x.floor(), y.floor());
+        let holds = |range: &std::ops::Range<i32>, v: f64| v >= f64::from(range.start) && v < f64::from(range.end);
+        let Window { columns, rows } = &self.window;
+        (holds(columns, x) && holds(rows, y))
+            .then(|| (y as i32 - rows.start) as usize * self.window.width() + (x as i32 - columns.start) as usize)
+    }
+
+    fn add(&mut self, pixel: usize, found: &PathLight<K>, weight: f64) {
+        self.counts[pixel] += 1;
+        let first = pixel * found.sums.len();
+        for &group in &found.touched {
+            let pairs = self.sums[first + group].iter_mut().zip(found.sums[group]);
+            pairs.for_each(|(sum, value)| add(sum, value, weight));
+        }
+    }
+
+    /// Adds the rectangle to its view. A pixel receives few rectangles, always in the order of the tiles.
+    fn merge_into(&self, films: &mut [HalfLight]) {
+        for (k, film) in films.iter_mut().enumerate() {
+            let groups = film.basis.pictures().len();
+            for (place, [x, y]) in self.window.cells().enumerate() {
+                let (x, y) = (x as usize, y as usize);
+                film.counts.set(x, y, film.counts.get(x, y) + self.counts[place]);
+                for (group, picture) in film.basis.pictures_mut().iter_mut().enumerate() {
+                    let mut pixel = picture.get(x, y);
+                    let sum = self.sums[place * groups + group][k];
+                    pixel.0.iter_mut().zip(sum).for_each(|(pixel, sum)| *pixel += sum as f32);
+                    picture.set(x, y, pixel);
+                }
+            }
+        }
+    }
+}
+
+fn add(sum: &mut [f64; 3], value: [f64; 3], weight: f64) {
+    for channel in 0..3 {
+        sum[channel] += weight * value[channel];
+    }
 }

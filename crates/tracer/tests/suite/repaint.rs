@@ -11,7 +11,7 @@ use mateval_tracer::{Coat, LightGroups, LightSampling, Lighting, Render, RenderS
 use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_views};
 
 use super::estimators::worst;
-use super::light_basis::{lit_room, view};
+use super::views::{lit_room, view};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad};
 use mateval_testkit::statistics::Renders;
 

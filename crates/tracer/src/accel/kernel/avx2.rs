@@ -1,14 +1,9 @@
-//! The kernel for processors with AVX2, FMA and the bit instructions of the same generation. `portable` shows the
+//! The kernel for processors with AVX2, FMA and the bit instructions of the same generation. [`Portable`] shows the
 //! formulas for a single lane.
-#![allow(unsafe_code, reason = "the one place where processor instructions are named")]
 
 use std::arch::x86_64::*;
 
-use super::lanes::{Boxes, Kernel, Triangles};
-use super::portable::Portable;
-use super::stack::Stack;
-use super::test_ray::{BoxRay, TriangleRay, WIDENED};
-use crate::accel::wide::{Block, Node, WIDTH};
+use super::{Block, BoxRay, Boxes, Kernel, Node, Portable, Stack, TriangleRay, Triangles, WIDENED, WIDTH};
 
 /// A proof that this processor supports the instructions: only [`Self::detect`] creates it.
 #[derive(Clone, Copy, Debug)]
@@ -173,7 +168,7 @@ fn sheared(corner: &[[f32; WIDTH]; 3], ray: &TriangleRay) -> Vectors {
     [_mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[0]), z, x), _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[1]), z, y), z]
 }
 
-/// See `portable::difference`.
+/// See `difference` of [`Portable`].
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
 fn difference(p: Vectors, q: Vectors) -> __m256 {

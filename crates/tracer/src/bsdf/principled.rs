@@ -19,11 +19,9 @@ use std::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use mateval_scene::material::{Distribution, PrincipledFlavour};
 
-use crate::bsdf::facets::{Facets, reflect};
-use crate::bsdf::fresnel;
-use crate::bsdf::principled_tables::{BlenderTables, FacetAlbedo};
-use crate::bsdf::sample::LocalSample;
-use crate::warp;
+use super::albedo_tables::{BlenderTables, FacetAlbedo};
+use super::facets::{Facets, LocalSample, fresnel_from_thinner, reflect, schlick_weight};
+use crate::sampling;
 
 /// The material at one point.
 #[derive(Clone, Copy, Debug)]
@@ -154,7 +152,7 @@ impl<'w> Principled<'w> {
             dielectric: matt,
             metallic: self.metallic,
             albedo: None,
-            base: Base::Disney { roughness: self.roughness, fresnel: fresnel::schlick_weight(wo.z) },
+            base: Base::Disney { roughness: self.roughness, fresnel: schlick_weight(wo.z) },
             base_weight: matt * FRAC_1_PI,
             facet_share,
             facet_density: facet_share / (wo.z + slope),
@@ -211,30 +209,6 @@ impl PrincipledView {
         (gain * f0, gain * (Vec3::ONE - f0))
     }
 
-    /// The derivative of [`Self::tint`] by the base colour, per channel. It goes with [`Response::of_colors`].
-    pub(crate) fn tint_slope(&self, base_color: Vec3) -> Tint {
-        let (metal, metal_rise) = match &self.albedo {
-            _ if self.metallic == 0.0 => (Vec3::ZERO, Vec3::ZERO),
-            Some(albedo) => self.blender_metal_slope(albedo, base_color),
-            None => (Vec3::splat(self.metallic), Vec3::splat(-self.metallic)),
-        };
-        Tint { metal, metal_rise, base: Vec3::splat(self.base_weight) }
-    }
-
-    /// The derivative of [`Self::blender_metal`], zero outside 0..1, where that one does not change.
-    fn blender_metal_slope(&self, albedo: &FacetAlbedo, base_color: Vec3) -> (Vec3, Vec3) {
-        let channel = |f0: f32| {
-            if !(0.0..=1.0).contains(&f0) {
-                return (0.0, 0.0);
-            }
-            let mean = f0 + (1.0 - f0) / 21.0;
-            let (gain, slope) = (albedo.gain(mean), albedo.gain_slope(mean) * (20.0 / 21.0));
-            (self.metallic * (gain + slope * f0), self.metallic * (slope * (1.0 - f0) - gain))
-        };
-        let [x, y, z] = base_color.to_array().map(channel);
-        (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
-    }
-
     /// The response to light from `wi`. Both directions lie above the surface.
     pub(crate) fn response(&self, wi: Vec3) -> Response {
         let half = self.wo + wi;
@@ -247,12 +221,8 @@ impl PrincipledView {
         let dielectric = self.dielectric > 0.0;
         Response {
             bounce: facets * wi.z * self.unmasked(wi.z, alpha2),
-            schlick: fresnel::schlick_weight(cos),
-            dielectric: if dielectric {
-                self.dielectric * fresnel::dielectric_from_thinner(cos, self.eta)
-            } else {
-                0.0
-            },
+            schlick: schlick_weight(cos),
+            dielectric: if dielectric { self.dielectric * fresnel_from_thinner(cos, self.eta) } else { 0.0 },
             base: self.base(wi.z, cos),
             cos: wi.z,
             density: facets * self.facet_density + self.base_density * wi.z,
@@ -281,7 +251,7 @@ impl PrincipledView {
         match self.base {
             Base::Lambert => 1.0,
             Base::Disney { roughness, fresnel: fo } => {
-                let fi = fresnel::schlick_weight(cos_i);
+                let fi = schlick_weight(cos_i);
                 let retro = 2.0 * roughness * cos_difference * cos_difference;
                 (1.0 - 0.5 * fo) * (1.0 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1.0))
             }
@@ -294,20 +264,13 @@ impl PrincipledView {
         let wi = if u[0] < self.facet_share {
             reflect(self.wo, Facets::new(Distribution::Ggx, self.alpha).sample(self.wo, [u[1], u[2]]))
         } else {
-            warp::cosine_hemisphere([u[1], u[2]])
+            sampling::cosine_hemisphere([u[1], u[2]])
         };
         if wi.z <= 0.0 {
             return None;
         }
         let response = self.response(wi);
         (response.density > 0.0).then_some((wi, response))
-    }
-}
-
-impl Response {
-    /// Without what does not depend on the base colour.
-    pub(crate) fn of_colors(&self) -> Self {
-        Self { dielectric: 0.0, ..*self }
     }
 }
 
@@ -324,4 +287,117 @@ impl Tint {
 fn slope(cos: f32, alpha2: f32) -> f32 {
     let cos2 = cos * cos;
     (cos2 + alpha2 * (1.0 - cos2)).max(0.0).sqrt()
+}
+
+/// The part of a BSDF to evaluate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BsdfPart {
+    /// All of it.
+    All,
+    /// The part that reflects stage lights ([`crate::StageLight`]), without highlights. Of principled materials this is the
+    /// base and, in place of metal facets, a diffuse part with the light that they keep; of others, all but delta lobes.
+    Stage,
+}
+
+/// One point of a surface, seen from one direction, as `K` principled variants: one base colour each, over one or two
+/// pairs of roughness and metallic.
+///
+/// All variants share the directions that are sampled. With two pairs, directions come from both densities in equal
+/// parts (the balance heuristic for one sample, Veach 1997, section 9.2.4): a variant's weight is then at most twice what
+/// its own density would give it, so that paths serve both pairs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PrincipledVariants<const K: usize> {
+    view: PrincipledView,
+    second: Option<Second>,
+    tints: [Tint; K],
+}
+
+/// A second material at the same point, and the number of the first variant that has its roughness and metallic.
+pub(super) type SecondPrincipled<'w> = (Principled<'w>, usize);
+
+/// The other pair of roughness and metallic.
+#[derive(Clone, Copy, Debug)]
+struct Second {
+    view: PrincipledView,
+    /// The first variant that has it; all later ones do too.
+    from: usize,
+}
+
+/// The responses to one direction of light, and the density with which the direction is sampled.
+struct Responses {
+    first: Response,
+    second: Option<(Response, usize)>,
+    density: f32,
+}
+
+impl<const K: usize> PrincipledVariants<K> {
+    /// Variants of `base_colors`, seen from `wo` in the frame. Those from number `second.1` on have the roughness and
+    /// metallic of `second.0`, the others those of `first`.
+    pub(super) fn new(
+        first: &Principled<'_>,
+        second: Option<&SecondPrincipled<'_>>,
+        base_colors: &[Vec3; K],
+        wo: Vec3,
+    ) -> Self {
+        let view = first.seen_from(wo);
+        let second = second.map(|(principled, from)| Second { view: principled.seen_from(wo), from: *from });
+        let tint = |k: usize| match &second {
+            Some(second) if k >= second.from => second.view.tint(base_colors[k]),
+            _ => view.tint(base_colors[k]),
+        };
+        Self { view, second, tints: std::array::from_fn(tint) }
+    }
+
+    /// The values with the cosine, per variant, and the density with which [`Self::sample`] samples `wi`.
+    pub(super) fn evaluate(&self, wi: Vec3, part: BsdfPart) -> ([Vec3; K], f32) {
+        let responses = self.responses(wi);
+        (self.values(&responses, part), responses.density)
+    }
+
+    /// A direction above the surface with its weights (values over density) and density. `None` if the sample falls
+    /// below the surface.
+    pub(super) fn sample(&self, u: [f32; 3]) -> Option<(Vec3, [Vec3; K], f32)> {
+        let (wi, responses) = match &self.second {
+            None => {
+                let (wi, first) = self.view.sample(u)?;
+                let density = first.density;
+                (wi, Responses { first, second: None, density })
+            }
+            Some(second) => {
+                let (view, choice) =
+                    if u[0] < 0.5 { (&self.view, 2.0 * u[0]) } else { (&second.view, 2.0 * u[0] - 1.0) };
+                let (wi, _) = view.sample([choice, u[1], u[2]])?;
+                (wi, self.responses(wi))
+            }
+        };
+        let density = responses.density;
+        Some((wi, self.values(&responses, BsdfPart::All).map(|value| value / density), density))
+    }
+
+    fn responses(&self, wi: Vec3) -> Responses {
+        let first = self.view.response(wi);
+        match &self.second {
+            None => Responses { density: first.density, first, second: None },
+            Some(Second { view, from }) => {
+                let other = view.response(wi);
+                let density = 0.5 * (first.density + other.density);
+                Responses { first, second: Some((other, *from)), density }
+            }
+        }
+    }
+
+    fn values(&self, responses: &Responses, part: BsdfPart) -> [Vec3; K] {
+        let shown = |view: &PrincipledView, response: Response| match part {
+            BsdfPart::All => response,
+            BsdfPart::Stage => view.without_highlights(response),
+        };
+        let first = shown(&self.view, responses.first);
+        match (&self.second, &responses.second) {
+            (Some(Second { view, .. }), Some((other, from))) => {
+                let other = shown(view, *other);
+                std::array::from_fn(|k| self.tints[k].value(if k >= *from { &other } else { &first }))
+            }
+            _ => self.tints.map(|tint| tint.value(&first)),
+        }
+    }
 }
