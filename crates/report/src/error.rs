@@ -1,10 +1,13 @@
-//! The error of this crate, split by what a caller can do about it.
+//! The error of this crate, split by what a caller can do about it, and why a result cannot stand beside another one, or
+//! does not match the dataset or the submission that it names.
 
+use std::fmt;
 use std::path::PathBuf;
 
-use mateval_scene::Finding;
-
-use crate::mismatch::Mismatch;
+use mateval_eval::protocol::SCORER_VERSION;
+use mateval_eval::result::ResultFile;
+use mateval_eval::result_key::ResultKey;
+use mateval_scene::{Finding, SceneId};
 
 /// Why results could not be shown.
 #[derive(Debug, thiserror::Error)]
@@ -100,4 +103,207 @@ impl ReportError {
 
 fn joined(mismatches: &[Mismatch]) -> String {
     mismatches.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
+
+/// One reason. Methods are named as their submissions name them.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Mismatch {
+    /// A result has no scores under the protocol.
+    #[error(
+        "the result of '{method}' has no scores under protocol '{protocol}', only under: {}; score it with \
+         --protocol {protocol}, or choose another --protocol",
+        scored.join(", ")
+    )]
+    Protocol {
+        /// The method.
+        method: String,
+        /// The protocol that was asked for.
+        protocol: String,
+        /// The protocols that the result has scores under.
+        scored: Vec<String>,
+    },
+    /// Two results depend on different datasets, protocols, scorers or LPIPS weights.
+    #[error(
+        "'{first}' and '{other}' have different fingerprints: dataset, protocol, scorer or LPIPS weights differ; \
+         score both again with the same ones"
+    )]
+    Fingerprints {
+        /// A method.
+        first: String,
+        /// The method that differs from it.
+        other: String,
+    },
+    /// Two results cover different scenes.
+    #[error("'{first}' and '{other}' were scored on different scenes; score both on the same scenes")]
+    Scenes {
+        /// A method.
+        first: String,
+        /// The method that differs from it.
+        other: String,
+    },
+    /// A result covers fewer scenes than the others.
+    #[error(
+        "'{method}' was scored on {scored} of {scenes} scenes; score it on all, or add --partial to rank it on these"
+    )]
+    TooFewScenes {
+        /// The method.
+        method: String,
+        /// The number of scenes that it was scored on.
+        scored: usize,
+        /// The number of scenes that any result covers.
+        scenes: usize,
+    },
+    /// Two results assign a scene to different houses.
+    #[error("'{first}' and '{other}' assign scene '{scene}' to different houses: one was changed; score both again")]
+    Houses {
+        /// A method.
+        first: String,
+        /// The method that differs from it.
+        other: String,
+        /// The scene.
+        scene: SceneId,
+    },
+    /// A result does not state the house of a scene.
+    #[error("the result of '{method}' does not state the house of scene '{scene}'; score it again with this version")]
+    NoHouse {
+        /// The method.
+        method: String,
+        /// The scene.
+        scene: SceneId,
+    },
+    /// A result lists a scene twice.
+    #[error("the result of '{method}' lists a scene twice; score it again")]
+    RepeatedScene {
+        /// The method.
+        method: String,
+    },
+    /// A result's fingerprint does not follow from the protocol, dataset, scenes and weights that it lists.
+    #[error(
+        "the result of '{method}' states fingerprint {stated}, but its protocol, dataset, scenes and weights give \
+         {found}: it was changed; score it again"
+    )]
+    Changed {
+        /// The method.
+        method: String,
+        /// The fingerprint in the result.
+        stated: String,
+        /// The fingerprint that follows from the rest of the result.
+        found: String,
+    },
+    /// A result holds a number that no metric gives.
+    #[error("the result of '{method}' holds {value:e} for '{key}', which is not a possible score; score it again")]
+    ImpossibleScore {
+        /// The method.
+        method: String,
+        /// The key of the number.
+        key: ResultKey,
+        /// The number.
+        value: f64,
+    },
+    /// A result was made by another version of the scorer.
+    #[error("the result has scorer version {found}, expected {SCORER_VERSION}; score it again")]
+    Scorer {
+        /// The version in the result.
+        found: u32,
+    },
+    /// A result was made on another dataset, or on another version of it.
+    #[error(
+        "the result was made on {}, but the dataset '{}' is {}; use the dataset that was scored, or score again",
+        expected, path.display(), found
+    )]
+    Dataset {
+        /// The dataset that the result names.
+        expected: DatasetVersion,
+        /// Folder of the dataset that was given.
+        path: PathBuf,
+        /// What it is.
+        found: DatasetVersion,
+    },
+    /// A result has no scores of a scene.
+    #[error("scene '{scene}' was not scored; choose one of: {}", ids(scored))]
+    SceneNotScored {
+        /// The scene.
+        scene: SceneId,
+        /// The scenes that were scored.
+        scored: Vec<SceneId>,
+    },
+    /// A submission is not the one that was scored, or has changed since. One hash covers all of its files, so that it
+    /// does not show which file differs.
+    #[error(
+        "the result was made from {}, but the submission '{}' is {}, hashed over submission.json and its {maps} maps of \
+         the scored scenes: it is another one, or a file has changed; score it again",
+        expected, path.display(), found
+    )]
+    Submission {
+        /// The submission that the result names.
+        expected: SubmissionVersion,
+        /// Folder of the submission that was given.
+        path: PathBuf,
+        /// What it is.
+        found: SubmissionVersion,
+        /// The number of maps that were hashed.
+        maps: usize,
+    },
+    /// A score that was computed again differs from the result's.
+    #[error(
+        "'{key}' of scene '{scene}' is {} in the result, but {found} computed again: the result was changed, or made by \
+         another version; score it again",
+        expected.map_or("missing".to_owned(), |expected| expected.to_string())
+    )]
+    Score {
+        /// The key of the score.
+        key: ResultKey,
+        /// The scene.
+        scene: SceneId,
+        /// The result's score.
+        expected: Option<f64>,
+        /// The score computed again.
+        found: f64,
+    },
+}
+
+/// A dataset, as a result names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DatasetVersion {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// SHA-256 of its manifest, hex.
+    pub manifest_sha256: String,
+}
+
+/// A submission, as a result names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SubmissionVersion {
+    /// The method's name.
+    pub method: String,
+    /// The hash over its files.
+    pub sha256: String,
+}
+
+impl fmt::Display for DatasetVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}' {} with manifest {}", self.name, self.version, self.manifest_sha256)
+    }
+}
+
+impl fmt::Display for SubmissionVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}' with hash {}", self.method, self.sha256)
+    }
+}
+
+impl Mismatch {
+    /// The reason for which a result has no scores under a protocol, if it has none.
+    pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
+        let method = result.shown_method();
+        let scored = || result.protocols.keys().cloned().collect();
+        let is_scored = result.protocols.contains_key(protocol);
+        (!is_scored).then(|| Self::Protocol { method, protocol: protocol.to_owned(), scored: scored() })
+    }
+}
+
+fn ids(scenes: &[SceneId]) -> String {
+    scenes.iter().map(SceneId::as_str).collect::<Vec<_>>().join(", ")
 }

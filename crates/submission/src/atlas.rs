@@ -65,9 +65,7 @@ fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Vec<TriangleMesh>, Scene
 /// The part of a triangle inside a texel's square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
-    /// The texel's column.
     pub(crate) column: usize,
-    /// The triangle.
     pub(crate) triangle: usize,
     /// Texels, above 0 and at most 1.
     pub(crate) area: f64,
@@ -238,22 +236,18 @@ impl TexelSet {
         all
     }
 
-    /// Texels in a row of the map.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows of the map.
     pub(crate) fn height(&self) -> usize {
         self.height
     }
 
-    /// How many texels it holds.
     pub(crate) fn count(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Whether it holds texel `at`.
     pub(crate) fn holds(&self, at: usize) -> bool {
         self.words[at / 64] >> (at % 64) & 1 == 1
     }
@@ -268,12 +262,10 @@ impl TexelSet {
         }
     }
 
-    /// Removes texel `at`.
     pub(crate) fn remove(&mut self, at: usize) {
         self.words[at / 64] &= !(1 << (at % 64));
     }
 
-    /// Its texels in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.words.iter().enumerate().flat_map(|(word, bits)| {
             let after = |bits: &u64| Some(bits & bits.wrapping_sub(1)).filter(|bits| *bits != 0);
@@ -300,7 +292,6 @@ struct Polygon {
 }
 
 impl Polygon {
-    /// The whole triangle.
     fn new([a, b, c]: [DVec2; 3]) -> Self {
         let mut polygon = Self { corners: [DVec2::ZERO; 8], count: 0 };
         [a, b, c].into_iter().for_each(|corner| polygon.push(corner));

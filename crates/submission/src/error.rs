@@ -13,7 +13,6 @@ pub enum SubmissionError {
     Io {
         /// What was tried, as in "read" or "write".
         action: &'static str,
-        /// The file or folder.
         path: PathBuf,
         /// What the system reported.
         source: std::io::Error,
@@ -29,7 +28,6 @@ pub enum SubmissionError {
     /// An archive that is refused.
     #[error("cannot unpack '{}':{}", path.display(), Finding::list(findings))]
     Archive {
-        /// The archive.
         path: PathBuf,
         /// What is wrong with it; at least one.
         findings: Vec<Finding>,
@@ -37,7 +35,6 @@ pub enum SubmissionError {
     /// A file of the submission that nothing can replace.
     #[error("cannot use '{}': {fault}", path.display())]
     File {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it.
         fault: FileFault,
@@ -45,9 +42,7 @@ pub enum SubmissionError {
     /// The public files of the dataset contradict each other.
     #[error("cannot check against '{}': {fault}; run `mateval prep verify`", scene_file.display())]
     UnsoundScene {
-        /// The scene's `scene.json`.
         scene_file: PathBuf,
-        /// The contradiction.
         fault: SceneFault,
     },
     /// The dataset or the submission could not be read.

@@ -69,7 +69,6 @@ impl SubmittedFile {
         &self.hashed
     }
 
-    /// Its bytes.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }

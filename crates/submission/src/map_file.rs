@@ -52,16 +52,13 @@ pub fn default_value(map: Map) -> f32 {
 /// The header of a map's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MapHeader {
-    /// Of a PNG.
     Png(PngHeader),
-    /// Of an OpenEXR file.
     Exr(ExrHeader),
 }
 
 /// A map that can be used.
 #[derive(Clone, Debug)]
 pub struct MapFile {
-    /// The file's header.
     pub header: MapHeader,
     /// Colours of a base colour; scalars of the others. All numbers are finite and in range.
     pub texture: Texture,

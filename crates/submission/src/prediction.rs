@@ -32,7 +32,6 @@ pub struct PredictedMaterial {
 }
 
 impl PredictedMaterial {
-    /// A map's texture.
     pub fn texture(&self, map: Map) -> &Texture {
         match map {
             Map::BaseColor => &self.base_color,

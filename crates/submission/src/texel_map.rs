@@ -22,7 +22,6 @@ pub const LEAST_COSINE: f64 = 1e-3;
 /// A texel of an atlas of which at least a part lies on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTexel {
-    /// Its column.
     pub column: usize,
     /// The uv of the place that represents it; none where that is its centre.
     pub off_centre: Option<[f32; 2]>,

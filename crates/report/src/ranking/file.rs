@@ -6,9 +6,11 @@ use mateval_scene::SceneId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::holm::LEVEL;
 use mateval_eval::metric::Better;
 use mateval_eval::result_key::ResultKey;
+
+/// Differences with a corrected p-value below this are significant.
+pub(super) const LEVEL: f64 = 0.05;
 
 /// Methods ranked under one protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

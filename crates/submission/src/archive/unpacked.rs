@@ -62,7 +62,6 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// Counts an entry.
     pub(super) fn add_entry(&mut self) -> Result<(), Fault> {
         self.entries += 1;
         if self.entries <= MAX_ENTRIES {

@@ -245,7 +245,6 @@ pub(super) struct Readings {
     slope: Option<[f64; 3]>,
 }
 
-/// Measures a scene.
 pub(super) fn readings(looks: &[Look]) -> Readings {
     if looks.len() < FEWEST_PIXELS as usize {
         return Readings::default();

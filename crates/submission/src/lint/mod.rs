@@ -43,7 +43,6 @@ const PLACES: usize = 3;
 pub struct LintPlan<'a> {
     /// The dataset that the submission was made for; its ground truth is not needed.
     pub dataset: &'a Dataset,
-    /// The submission's folder.
     pub submission: &'a Path,
     /// Name and version of the tool, for the report.
     pub tool: String,

@@ -165,7 +165,6 @@ fn coarse_texels(world: &World, instance: usize, camera: &Camera) -> Vec<CoarseT
 /// How an atlas may have been turned when it was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {
-    /// As it should be.
     None,
     /// Top and bottom exchanged: v counted from the other end.
     Vertical,
@@ -196,7 +195,6 @@ impl Turn {
 /// A pixel of the picture with the base colour that the submission has there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
-    /// Its instance.
     pub(super) instance: usize,
     /// Its neighbourhood in the picture.
     pub(super) tile: usize,
@@ -266,7 +264,6 @@ pub(super) struct Pairs {
 }
 
 impl Pairs {
-    /// Adds one pair.
     pub(super) fn add(&mut self, x: f64, y: f64) {
         self.count += 1.0;
         self.x += x;
@@ -286,7 +283,6 @@ impl Pairs {
         })
     }
 
-    /// The number of pairs.
     pub(super) fn count(&self) -> f64 {
         self.count
     }

@@ -1,10 +1,102 @@
-//! The paper's own Tables II to V. They were measured on other renders and are never ranked with results.
+//! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers were
+//! measured on other renders and are never ranked with results.
 
 use mateval_eval::metric::{Better, Metric};
+use mateval_eval::protocol::Protocol;
 use mateval_eval::result_key::{PictureKind, Views};
+use minijinja::context;
+use minijinja::value::Serde;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::board::Board;
+use super::entries::ErrataFile;
+use super::file::LeaderboardDataset;
+use super::site::{Page, SiteWriter};
+use crate::error::ReportError;
+use crate::ranking::file::{IntervalKind, RankingRules};
 
 const TABLES: &str = include_str!("paper_tables.json");
+
+/// Writes `protocol.html`, `paper.html` and `errata.html`.
+pub(super) fn write(board: &Board<'_>, errata: Option<&ErrataFile>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    write_protocol(board, site)?;
+    let paper = paper_page();
+    site.page(&Page {
+        file: "paper.html",
+        template: "paper.j2",
+        title: "The paper's numbers",
+        scripts: &["sort.js"],
+        values: context! { paper => Serde(&paper) },
+    })?;
+    let errata = errata.map_or(&[][..], |errata| &errata.entries);
+    site.page(&Page {
+        file: "errata.html",
+        template: "errata.j2",
+        title: "Errata",
+        scripts: &[],
+        values: context! { errata => Serde(errata) },
+    })
+}
+
+#[derive(Serialize)]
+struct ProtocolPage<'a> {
+    dataset: &'a LeaderboardDataset,
+    weights: Option<&'a String>,
+    protocol_sha256: String,
+    rules: Vec<(String, String)>,
+    ranking: &'a RankingRules,
+    percent: u32,
+    /// How intervals were found; none if there are no intervals.
+    kind: Option<IntervalKind>,
+}
+
+/// Writes `protocol.html`: the fingerprint and everything that it is a hash of.
+fn write_protocol(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let (Some(result), Some(scores)) = (board.results.first(), board.scores.first()) else { return Ok(()) };
+    let rules = &board.ranking().rules;
+    let intervals = board.ranking().keys.values().flat_map(|key| &key.standings);
+    let page = ProtocolPage {
+        dataset: &board.file.dataset,
+        weights: result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_ref),
+        protocol_sha256: scores.protocol.sha256(),
+        rules: rules_of(&scores.protocol),
+        ranking: rules,
+        percent: (100.0 * rules.confidence).round() as u32,
+        kind: intervals.filter_map(|standing| standing.interval).map(|interval| interval.kind).next(),
+    };
+    site.page(&Page {
+        file: "protocol.html",
+        template: "protocol.j2",
+        title: "Protocol",
+        scripts: &[],
+        values: context! { page => Serde(&page) },
+    })
+}
+
+/// Every number and word of a protocol, with the path of its key.
+fn rules_of(protocol: &Protocol) -> Vec<(String, String)> {
+    let mut rules = Vec::new();
+    // From its JSON text, which gives single-precision numbers with as few digits as they need.
+    let value = serde_json::from_str(&mateval_scene::json::to_text(protocol)).unwrap_or(Value::Null);
+    leaves(&value, String::new(), &mut rules);
+    rules
+}
+
+fn leaves(value: &Value, path: String, rules: &mut Vec<(String, String)>) {
+    match value {
+        Value::Object(map) => {
+            let join = |key: &String| if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+            map.iter().for_each(|(key, value)| leaves(value, join(key), rules));
+        }
+        Value::Array(values) => {
+            let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            rules.push((path, values.iter().map(text).collect::<Vec<_>>().join(", ")));
+        }
+        Value::String(word) => rules.push((path, word.clone())),
+        other => rules.push((path, other.to_string())),
+    }
+}
 
 /// All of the paper's numbers.
 #[derive(Deserialize)]
@@ -37,7 +129,7 @@ struct PaperScores {
 
 /// The tables as the page shows them.
 #[derive(Serialize)]
-pub(super) struct PaperPage {
+struct PaperPage {
     source: String,
     note: String,
     tables: Vec<PaperTable>,
@@ -87,7 +179,7 @@ const LAYOUT: [Words; 4] = [
 /// The columns of a block.
 const METRICS: [Metric; 4] = [Metric::Mse, Metric::Psnr, Metric::Ssim, Metric::LpipsAlex];
 
-fn head(metric: Metric) -> String {
+fn metric_head(metric: Metric) -> String {
     let arrow = match metric.better() {
         Better::Lower => "↓",
         Better::Higher => "↑",
@@ -96,11 +188,11 @@ fn head(metric: Metric) -> String {
 }
 
 /// The tables, ready to be shown.
-pub(super) fn page() -> PaperPage {
+fn paper_page() -> PaperPage {
     let tables: PaperTables = serde_json::from_str(TABLES).expect("a test reads the file");
     let table = |(title, blocks): Words| PaperTable {
         title,
-        metrics: METRICS.map(head),
+        metrics: METRICS.map(metric_head),
         blocks: blocks.iter().map(|(title, ..)| *title).collect(),
         rows: tables.rows.iter().filter_map(|row| shown(row, blocks)).collect(),
     };
@@ -133,7 +225,7 @@ mod tests {
     /// The first row of Table III; Table II has more rows than the others.
     #[test]
     fn the_papers_numbers() {
-        let page = page();
+        let page = paper_page();
         let rows: Vec<usize> = page.tables.iter().map(|table| table.rows.len()).collect();
         assert_eq!(rows, [18, 10, 10, 10]);
         let first = &page.tables[1].rows[0];

@@ -1,19 +1,27 @@
-//! Scores of the albedo after scaling alone, with one scale for each picture, each instance or the whole scene.
+//! Scores that put the explanation in context: those of the albedo after scaling alone, with one scale for each picture,
+//! each instance or the whole scene; and the worst instances under each light, from the result alone.
 
 use std::collections::BTreeMap;
 
-use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_metrics::{MetricError, Psnr};
-use mateval_scene::SceneId;
-
-use super::file::{AlignedBy, AlignmentScores};
-use super::scales::best_scale;
-use crate::error::ReportError;
 use mateval_eval::alignment::scaled;
 use mateval_eval::measure::{Albedo, albedo_mse};
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result_key::Views;
+use mateval_eval::result::ProtocolResult;
+use mateval_eval::result_key::{PictureKind, Views};
 use mateval_eval::shown_scene::SceneAlbedo;
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_metrics::{MetricError, Psnr};
+use mateval_scene::{InstanceId, SceneId};
+
+use super::file::{AlignedBy, AlignmentScores, LightShare};
+use super::kinds::best_scale;
+use crate::error::ReportError;
+
+/// How many of the worst instances are listed and shown.
+pub(super) const WORST: usize = 10;
+
+/// The kinds of renders for which results hold errors of instances.
+pub(super) const LIGHTS: [PictureKind; 2] = [PictureKind::RgbTrue, PictureKind::RgbFitted];
 
 const ALL: [AlignedBy; 6] = [
     AlignedBy::None,
@@ -118,12 +126,42 @@ fn aligned(by: AlignedBy, scales: &Scales, number: usize, view: &SceneAlbedo) ->
     aligned
 }
 
+/// For each kind of render, the [`WORST`] instances with the largest shares of the scene's squared error in the input
+/// view and the novel views, the largest first.
+pub(super) fn worst_under_lights(scores: &ProtocolResult, scene: &SceneId) -> Vec<LightShare> {
+    LIGHTS.into_iter().flat_map(|picture| of_kind(scores, scene, picture)).collect()
+}
+
+fn of_kind(scores: &ProtocolResult, scene: &SceneId, picture: PictureKind) -> Vec<LightShare> {
+    let mut sums: BTreeMap<&InstanceId, (f64, usize, Option<String>)> = BTreeMap::new();
+    let of_scene = scores.instances.iter().filter(|errors| errors.scene == *scene && errors.picture == picture);
+    for errors in of_scene.filter(|errors| matches!(errors.views, Views::Input | Views::Novel)) {
+        let sum = sums.entry(&errors.instance).or_insert_with(|| (0.0, 0, errors.category.clone()));
+        sum.0 += errors.mse * errors.pixels as f64;
+        sum.1 += errors.pixels;
+    }
+    let total: f64 = sums.values().map(|(sum, ..)| sum).sum();
+    let share = |(instance, (sum, pixels, category)): (&InstanceId, (f64, usize, Option<String>))| LightShare {
+        picture,
+        instance: instance.clone(),
+        category,
+        pixels,
+        mse: sum / pixels as f64,
+        share: sum / total,
+    };
+    // Without an error above the noise, shares are undefined.
+    let mut shares: Vec<LightShare> = if total > 0.0 { sums.into_iter().map(share).collect() } else { Vec::new() };
+    shares.sort_by(|a, b| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
+    shares.truncate(WORST);
+    shares
+}
+
 #[cfg(test)]
 mod tests {
+    use mateval_eval::truth::ViewTruth;
     use mateval_image::Normal;
 
     use super::*;
-    use mateval_eval::truth::ViewTruth;
 
     /// Two views in which instances 1 and 2 have a half and a fourth of their true brightness.
     fn views() -> Vec<SceneAlbedo> {
