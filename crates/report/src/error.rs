@@ -24,74 +24,49 @@ pub enum ReportError {
         "'{}' holds no result; expected <name>.json or <method>/<name>.json below it, as `mateval eval score --out` writes it",
         folder.display()
     )]
-    NoResultsBelow {
-        /// The folder.
-        folder: PathBuf,
-    },
+    NoResultsBelow { folder: PathBuf },
     /// A `.json` entry of a folder of results is a link or something else that is not a regular file: copy the file
     /// there.
     #[error("'{}' is not a regular file; expected a file, not a link to one; copy it there", path.display())]
-    NotAFile {
-        /// The entry of the folder.
-        path: PathBuf,
-    },
+    NotAFile { path: PathBuf },
     /// Files from which a leaderboard should be made cannot make one: every reason. Correct the files, or leave them out.
     #[error("these results cannot make a leaderboard:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
     /// The results hold no score that can be shown: choose another protocol, or score again.
     #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
     NothingToShow {
-        /// The protocol that was asked for.
         protocol: String,
         /// What was to be made of the scores, as in "a table".
         output: &'static str,
     },
     /// A folder that is not a leaderboard would be replaced: choose another one.
     #[error("'{}' exists and is not a leaderboard; choose another --out", path.display())]
-    NotALeaderboard {
-        /// The folder.
-        path: PathBuf,
-    },
+    NotALeaderboard { path: PathBuf },
     /// A submission whose pictures should be shown belongs to none of the results: score it, or leave it out.
     #[error(
         "no result was made from the submission '{}' as it is now; score it, or leave it out of --submission",
         path.display()
     )]
-    UnscoredSubmission {
-        /// The folder of the submission.
-        path: PathBuf,
-    },
+    UnscoredSubmission { path: PathBuf },
     /// The track `relit` has several pictures for each view, and none of them can be chosen: show another track.
     #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,
     /// More houses than the bootstrap can draw from: rank fewer scenes.
     #[error("cannot rank scenes of {houses} houses; at most {most} are supported")]
-    TooManyHouses {
-        /// The number of houses.
-        houses: usize,
-        /// The largest number that is supported.
-        most: usize,
-    },
+    TooManyHouses { houses: usize, most: usize },
     /// The dataset could not be read, or a file could not be read or written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
     /// A scene could not be rendered or scored again.
     #[error(transparent)]
     Eval(#[from] mateval_eval::EvalError),
-    /// The submission could not be read.
     #[error(transparent)]
     Submission(#[from] mateval_submission::SubmissionError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-    /// Two pictures could not be compared.
     #[error("cannot compare {what}: {source}")]
-    Metric {
-        /// Which pictures.
-        what: String,
-        /// Why not.
-        source: mateval_metrics::MetricError,
-    },
+    Metric { what: String, source: mateval_metrics::MetricError },
 }
 
 impl ReportError {
@@ -115,9 +90,7 @@ pub enum Mismatch {
         scored.join(", ")
     )]
     Protocol {
-        /// The method.
         method: String,
-        /// The protocol that was asked for.
         protocol: String,
         /// The protocols that the result has scores under.
         scored: Vec<String>,
@@ -127,26 +100,14 @@ pub enum Mismatch {
         "'{first}' and '{other}' have different fingerprints: dataset, protocol, scorer or LPIPS weights differ; \
          score both again with the same ones"
     )]
-    Fingerprints {
-        /// A method.
-        first: String,
-        /// The method that differs from it.
-        other: String,
-    },
-    /// Two results cover different scenes.
+    Fingerprints { first: String, other: String },
     #[error("'{first}' and '{other}' were scored on different scenes; score both on the same scenes")]
-    Scenes {
-        /// A method.
-        first: String,
-        /// The method that differs from it.
-        other: String,
-    },
+    Scenes { first: String, other: String },
     /// A result covers fewer scenes than the others.
     #[error(
         "'{method}' was scored on {scored} of {scenes} scenes; score it on all, or add --partial to rank it on these"
     )]
     TooFewScenes {
-        /// The method.
         method: String,
         /// The number of scenes that it was scored on.
         scored: usize,
@@ -155,78 +116,43 @@ pub enum Mismatch {
     },
     /// Two results assign a scene to different houses.
     #[error("'{first}' and '{other}' assign scene '{scene}' to different houses: one was changed; score both again")]
-    Houses {
-        /// A method.
-        first: String,
-        /// The method that differs from it.
-        other: String,
-        /// The scene.
-        scene: SceneId,
-    },
+    Houses { first: String, other: String, scene: SceneId },
     /// A result does not state the house of a scene.
     #[error("the result of '{method}' does not state the house of scene '{scene}'; score it again with this version")]
-    NoHouse {
-        /// The method.
-        method: String,
-        /// The scene.
-        scene: SceneId,
-    },
-    /// A result lists a scene twice.
+    NoHouse { method: String, scene: SceneId },
     #[error("the result of '{method}' lists a scene twice; score it again")]
-    RepeatedScene {
-        /// The method.
-        method: String,
-    },
+    RepeatedScene { method: String },
     /// A result's fingerprint does not follow from the protocol, dataset, scenes and weights that it lists.
     #[error(
         "the result of '{method}' states fingerprint {stated}, but its protocol, dataset, scenes and weights give \
          {found}: it was changed; score it again"
     )]
     Changed {
-        /// The method.
         method: String,
-        /// The fingerprint in the result.
         stated: String,
         /// The fingerprint that follows from the rest of the result.
         found: String,
     },
     /// A result holds a number that no metric gives.
     #[error("the result of '{method}' holds {value:e} for '{key}', which is not a possible score; score it again")]
-    ImpossibleScore {
-        /// The method.
-        method: String,
-        /// The key of the number.
-        key: ResultKey,
-        /// The number.
-        value: f64,
-    },
+    ImpossibleScore { method: String, key: ResultKey, value: f64 },
     /// A result was made by another version of the scorer.
     #[error("the result has scorer version {found}, expected {SCORER_VERSION}; score it again")]
-    Scorer {
-        /// The version in the result.
-        found: u32,
-    },
+    Scorer { found: u32 },
     /// A result was made on another dataset, or on another version of it.
     #[error(
         "the result was made on {}, but the dataset '{}' is {}; use the dataset that was scored, or score again",
         expected, path.display(), found
     )]
     Dataset {
-        /// The dataset that the result names.
         expected: DatasetVersion,
         /// Folder of the dataset that was given.
         path: PathBuf,
-        /// What it is.
         found: DatasetVersion,
     },
     /// A result has no scores of a scene.
     #[error("scene '{scene}' was not scored; choose one of: {}", ids(scored))]
-    SceneNotScored {
-        /// The scene.
-        scene: SceneId,
-        /// The scenes that were scored.
-        scored: Vec<SceneId>,
-    },
+    SceneNotScored { scene: SceneId, scored: Vec<SceneId> },
     /// A submission is not the one that was scored, or has changed since. One hash covers all of its files, so that it
     /// does not show which file differs.
     #[error(
@@ -235,11 +161,9 @@ pub enum Mismatch {
         expected, path.display(), found
     )]
     Submission {
-        /// The submission that the result names.
         expected: SubmissionVersion,
         /// Folder of the submission that was given.
         path: PathBuf,
-        /// What it is.
         found: SubmissionVersion,
         /// The number of maps that were hashed.
         maps: usize,
@@ -250,24 +174,13 @@ pub enum Mismatch {
          another version; score it again",
         expected.map_or("missing".to_owned(), |expected| expected.to_string())
     )]
-    Score {
-        /// The key of the score.
-        key: ResultKey,
-        /// The scene.
-        scene: SceneId,
-        /// The result's score.
-        expected: Option<f64>,
-        /// The score computed again.
-        found: f64,
-    },
+    Score { key: ResultKey, scene: SceneId, expected: Option<f64>, found: f64 },
 }
 
 /// A dataset, as a result names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DatasetVersion {
-    /// Its name.
     pub name: String,
-    /// Its version.
     pub version: String,
     /// SHA-256 of its manifest, hex.
     pub manifest_sha256: String,
@@ -276,7 +189,6 @@ pub struct DatasetVersion {
 /// A submission, as a result names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubmissionVersion {
-    /// The method's name.
     pub method: String,
     /// The hash over its files.
     pub sha256: String,

@@ -41,10 +41,7 @@ pub enum SubmissionError {
     },
     /// The public files of the dataset contradict each other.
     #[error("cannot check against '{}': {fault}; run `mateval prep verify`", scene_file.display())]
-    UnsoundScene {
-        scene_file: PathBuf,
-        fault: SceneFault,
-    },
+    UnsoundScene { scene_file: PathBuf, fault: SceneFault },
     /// The dataset or the submission could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),

@@ -77,7 +77,8 @@ pub fn decode<'a>(
     map: Map,
     atlas: impl FnOnce() -> Result<&'a TriangleMesh, SceneError>,
 ) -> Result<Result<MapFile, FileFault>, SceneError> {
-    let DecodedFile { header, texture, sha256 } = match decode_any(file, map) {
+    let sha256 = file.hashed().sha256.clone();
+    let (header, texture) = match decoded(file, map) {
         Ok(decoded) => decoded,
         Err(fault) => return Ok(Err(fault)),
     };
@@ -85,28 +86,35 @@ pub fn decode<'a>(
     Ok(repaired.map(|(texture, bad_texels)| MapFile { header, texture, bad_texels, sha256 }))
 }
 
-/// A file whose numbers may be anything.
-struct DecodedFile {
-    header: MapHeader,
-    texture: Texture,
-    sha256: String,
-}
-
-fn decode_any(file: SubmittedFile, map: Map) -> Result<DecodedFile, FileFault> {
+/// Header and texels of a file, whose numbers may be anything.
+fn decoded(file: SubmittedFile, map: Map) -> Result<(MapHeader, Texture), FileFault> {
     let header = check_header(file.path(), file.bytes(), map)?;
-    let (path, sha256) = (file.path().to_owned(), file.hashed().sha256.clone());
+    let path = file.path().to_owned();
     let texture = texels(&path, file.into_bytes(), map, &header)?;
-    Ok(DecodedFile { header, texture, sha256 })
+    Ok((header, texture))
 }
 
 /// Reads the header. Fails if the file's kind, size or channels rule it out, before any texel is decoded.
 fn check_header(path: &Path, bytes: &[u8], map: Map) -> Result<MapHeader, FileFault> {
     check_kind(path, bytes)?;
-    let header = header_of(path, bytes)?;
+    let header = if path.extension().is_some_and(|ending| ending == "exr") {
+        ExrHeader::of(bytes).map(MapHeader::Exr).map_err(|error| error.to_string())
+    } else {
+        PngHeader::of(bytes).map(MapHeader::Png).map_err(|error| error.to_string())
+    };
+    let header = header.map_err(|what| {
+        let message = format!("its header is invalid: {}", shortened(&what));
+        FileFault::new("bad_header", message, "write the map again")
+    })?;
     match &header {
         MapHeader::Png(png) => {
             check_size(png.width as usize, png.height as usize)?;
-            check_end(png)?;
+            // Without its closing chunk a PNG was truncated, even if all texels can be decoded: nothing else proves that
+            // the file is complete.
+            if !png.ended {
+                let message = "truncated: it has no closing chunk (IEND)";
+                return Err(FileFault::new("truncated_picture", message, "write or copy it again, whole"));
+            }
         }
         MapHeader::Exr(exr) => check_exr(exr, map)?,
     }
@@ -152,18 +160,6 @@ fn kind_of(bytes: &[u8]) -> &'static str {
     KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map_or("not a picture", |(_, name)| name)
 }
 
-fn header_of(path: &Path, bytes: &[u8]) -> Result<MapHeader, FileFault> {
-    let header = if path.extension().is_some_and(|ending| ending == "exr") {
-        ExrHeader::of(bytes).map(MapHeader::Exr).map_err(|error| error.to_string())
-    } else {
-        PngHeader::of(bytes).map(MapHeader::Png).map_err(|error| error.to_string())
-    };
-    header.map_err(|what| {
-        let message = format!("its header is invalid: {}", shortened(&what));
-        FileFault::new("bad_header", message, "write the map again")
-    })
-}
-
 /// Fails unless the map is a square of a size that a submission may use.
 fn check_size(width: usize, height: usize) -> Result<(), FileFault> {
     let (least, most) = (*MAP_SIZES.start(), *MAP_SIZES.end());
@@ -178,16 +174,6 @@ fn check_size(width: usize, height: usize) -> Result<(), FileFault> {
         return Err(FileFault::new("too_many_texels", found, "bake it smaller"));
     }
     Ok(())
-}
-
-/// A PNG without its closing chunk was truncated. That holds even if all texels can be
-/// decoded, since nothing else proves that the file is complete.
-fn check_end(png: &PngHeader) -> Result<(), FileFault> {
-    if png.ended {
-        return Ok(());
-    }
-    let message = "truncated: it has no closing chunk (IEND)";
-    Err(FileFault::new("truncated_picture", message, "write or copy it again, whole"))
 }
 
 fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), FileFault> {

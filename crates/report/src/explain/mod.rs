@@ -49,7 +49,6 @@ const TARGET_SIZE: usize = 400;
 
 /// What to explain: one scene of one result, with the dataset and the submission that the result was made from.
 pub struct ExplainPlan<'a> {
-    /// The result.
     pub result: &'a ResultFile,
     /// The protocol whose scores are explained.
     pub protocol: &'a str,
@@ -57,7 +56,6 @@ pub struct ExplainPlan<'a> {
     pub dataset: &'a Dataset,
     /// Folder of the submission that was scored.
     pub submission: &'a Path,
-    /// The scene to explain.
     pub scene: &'a SceneId,
     /// Name and version of the tool, for the file.
     pub tool: String,
@@ -79,7 +77,6 @@ impl<'a> ExplainPlan<'a> {
 
 /// An explanation, and what is needed to draw its pictures.
 pub struct Explanation {
-    /// The numbers.
     pub file: ExplainFile,
     views: Vec<SceneAlbedo>,
     /// By index of the instance.

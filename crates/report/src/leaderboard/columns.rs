@@ -11,7 +11,6 @@ use super::entries::Verified;
 use super::file::LeaderboardMethod;
 use crate::ranking::file::{RankRange, RankedMethod, Ranking, Standing};
 
-/// A column of scores.
 #[derive(Clone, Serialize)]
 pub(super) struct Column {
     pub(super) key: ResultKey,
@@ -26,7 +25,6 @@ pub(super) struct Column {
     /// As in `PSNR`.
     pub(super) metric_title: &'static str,
     pub(super) better: Better,
-    /// Whether it is shown initially.
     pub(super) is_shown: bool,
 }
 
@@ -70,7 +68,6 @@ impl Column {
     }
 }
 
-/// Whether a column is shown initially.
 fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
     matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue | PictureKind::RgbFitted)
         && matches!(views, Views::Input | Views::Novel)
@@ -158,12 +155,10 @@ pub(super) const FACTS: [FactColumn; 2] = [
 /// The most characters of a text that a cell shows.
 const MOST_CHARACTERS: usize = 60;
 
-/// One column.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct FactColumn {
     /// Its name in links to a sorted board.
     key: &'static str,
-    /// Its head.
     title: &'static str,
     /// Whether its cells hold words, which are aligned to the left.
     is_word: bool,
@@ -172,12 +167,10 @@ pub(super) struct FactColumn {
     of: fn(&LeaderboardMethod, &ProtocolResult) -> Option<Fact>,
 }
 
-/// One cell.
 #[derive(Serialize)]
 pub(super) struct Fact {
     /// What the column is sorted by: a number with all digits, or a word.
     value: String,
-    /// The text of the cell.
     text: String,
     /// Small print below the text.
     note: String,

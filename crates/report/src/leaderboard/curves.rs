@@ -20,13 +20,12 @@ use super::entries::is_in_curves;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 
-/// Number of classes of shares.
+/// Classes of the share of pixels that the input view does not show.
 const SHARES: u32 = 5;
 /// Size of a chart, and the margins around its lines, in its own units.
 const SIZE: [f64; 2] = [320.0, 180.0];
 const MARGIN: [f64; 2] = [28.0, 16.0];
 
-/// Whether any scene has wide views.
 pub(super) fn has_wide_views(board: &Board<'_>) -> bool {
     board.results.iter().any(|result| !result.dataset.wide_views.is_empty())
 }
@@ -128,7 +127,6 @@ fn by_level<'a>(board: &'a Board<'_>, kind: PerturbationKind, column: &Column) -
     lines
 }
 
-/// What a method scored.
 struct Method<'a> {
     name: &'a str,
     pictures: &'a [PictureValues],

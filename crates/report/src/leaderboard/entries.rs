@@ -46,7 +46,6 @@ pub struct ResultsFolder {
     pub results: Vec<PathBuf>,
     /// The file of the truth's result.
     pub ceiling: Option<PathBuf>,
-    /// The file of the errata.
     pub errata: Option<PathBuf>,
 }
 
@@ -92,11 +91,9 @@ impl ResultsFolder {
 pub struct Entries {
     /// The results of the methods, with the scores of those single pictures alone that curves show.
     pub results: Vec<ResultFile>,
-    /// Whether each of them was verified.
     pub verified: Vec<Verified>,
     /// The result of the truth.
     pub ceiling: Option<ResultFile>,
-    /// The errata.
     pub errata: Option<ErrataFile>,
 }
 
@@ -129,9 +126,7 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
     if findings.is_empty() { Ok(entries) } else { Err(ReportError::UnfitFiles(findings)) }
 }
 
-/// What a leaderboard is made from.
 pub struct LeaderboardPlan<'a> {
-    /// The results.
     pub results: &'a [ResultFile],
     /// The result of the truth itself, which is shown below the methods and not ranked.
     pub ceiling: Option<&'a ResultFile>,
@@ -147,7 +142,6 @@ pub struct LeaderboardPlan<'a> {
     pub pictures: Option<&'a Path>,
     /// Submissions to draw pictures of.
     pub submissions: Option<Submissions<'a>>,
-    /// Name and version of the tool.
     pub tool: String,
 }
 
@@ -155,7 +149,6 @@ pub struct LeaderboardPlan<'a> {
 pub struct Submissions<'a> {
     /// The dataset that they were scored on.
     pub dataset: &'a Dataset,
-    /// Their folders.
     pub folders: Vec<PathBuf>,
     /// Which pictures are drawn of each.
     pub shown: Vec<Shown>,

@@ -29,7 +29,6 @@ pub(super) const ERROR: &str = "-error";
 
 /// A submission and the method that it belongs to.
 pub(super) struct NamedSubmission<'a> {
-    /// The method's id.
     pub(super) id: String,
     pub(super) folder: &'a Path,
     /// Scenes of the board that were not scored.

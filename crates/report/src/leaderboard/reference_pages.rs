@@ -98,7 +98,6 @@ fn leaves(value: &Value, path: String, rules: &mut Vec<(String, String)>) {
     }
 }
 
-/// All of the paper's numbers.
 #[derive(Deserialize)]
 struct PaperTables {
     source: String,
@@ -176,7 +175,6 @@ const LAYOUT: [Words; 4] = [
     ),
 ];
 
-/// The columns of a block.
 const METRICS: [Metric; 4] = [Metric::Mse, Metric::Psnr, Metric::Ssim, Metric::LpipsAlex];
 
 fn metric_head(metric: Metric) -> String {

@@ -43,10 +43,7 @@ const QUALITY: u8 = 90;
 #[serde(rename_all = "snake_case")]
 pub(super) enum Room {
     /// It is shown with the atlases of the truth and of these methods, which were scored on it.
-    Shown {
-        /// The methods' ids.
-        methods: Vec<String>,
-    },
+    Shown { methods: Vec<String> },
     /// Its geometry is larger than a page shows.
     TooLarge {
         /// The size of its geometry in MiB, rounded up.

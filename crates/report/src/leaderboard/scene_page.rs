@@ -123,7 +123,6 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
     })
 }
 
-/// Writes `scenes.html`.
 pub(super) fn write_list<'a>(board: &'a Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let card = |scene: &'a SceneId| {
         let kinds = board.pictures.kinds(TRUTH, scene, INPUT);
@@ -242,7 +241,6 @@ pub(super) fn write_rooms(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<()
 /// The script that shows a room, bundled with three.js and compressed; `tools/build_viewer.sh` builds it.
 const VIEWER: &[u8] = include_bytes!("../../viewer/room.min.js.gz");
 
-/// The script that shows a room.
 fn viewer() -> String {
     let mut text = String::new();
     GzDecoder::new(VIEWER).read_to_string(&mut text).expect("the file is part of the program, and a test reads it");

@@ -63,7 +63,6 @@ impl DrawTable {
         Self { seed, draws, made: Mutex::default() }
     }
 
-    /// The draws of `clusters` clusters.
     pub(super) fn of(&self, clusters: usize) -> Arc<Draws> {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         Arc::clone(made.entry(clusters).or_insert_with(|| Arc::new(Draws::new(self.seed, self.draws, clusters))))
@@ -107,7 +106,6 @@ impl Clusters {
         clusters
     }
 
-    /// The number of clusters.
     pub(super) fn len(&self) -> usize {
         self.scenes.len()
     }

@@ -152,7 +152,6 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Whether the difference is significant.
     pub fn is_significant(&self) -> bool {
         self.p_holm.is_some_and(|p| p < LEVEL)
     }

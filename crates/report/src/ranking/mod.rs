@@ -28,7 +28,6 @@ const DRAWS: usize = 10_000;
 /// first step.
 const DRAWS_A_PAIR: usize = 40;
 
-/// The seed of the random numbers.
 const SEED: u64 = 0;
 
 /// With fewer houses, intervals are Student's, as those of percentiles are too narrow.
@@ -160,7 +159,6 @@ impl<'a> Entrant<'a> {
     }
 }
 
-/// Results that can be ranked together.
 struct Board<'a> {
     entrants: Vec<Entrant<'a>>,
     /// The scenes that any result covers, in the dataset's order.

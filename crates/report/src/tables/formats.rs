@@ -6,7 +6,6 @@ use mateval_eval::metric::Better;
 
 use super::table::{Cell, Column, Table};
 
-/// Blanks between two columns.
 const GAP: &str = "  ";
 /// Bold on and off, as ANSI escape sequences.
 const BOLD: (&str, &str) = ("\x1b[1m", "\x1b[0m");

@@ -21,7 +21,6 @@ pub enum Grouping {
 pub(crate) enum Quantity {
     /// The number of compared pixels.
     Pixels,
-    /// A score.
     Score(Metric),
 }
 
@@ -78,7 +77,6 @@ pub(super) struct Block {
     pub(super) quantities: Vec<Quantity>,
 }
 
-/// One table.
 pub(super) struct Layout {
     pub(super) title: String,
     pub(super) blocks: Vec<Block>,

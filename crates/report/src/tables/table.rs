@@ -176,7 +176,6 @@ pub(super) struct Table<'a> {
     pub(super) groups: Vec<TableGroup<'a>>,
 }
 
-/// A column.
 pub(super) struct Column {
     pub(super) block: &'static str,
     /// Whether any of its values has a standard error.
