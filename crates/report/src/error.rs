@@ -12,46 +12,37 @@ use mateval_scene::{Finding, SceneId};
 /// Why results could not be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// Results cannot be shown together, or do not match the dataset or the submission: every reason. Score again, or
-    /// choose other inputs.
+    /// Results cannot be shown together, or do not match the dataset or the submission: every reason.
     #[error("{}", joined(.0))]
     Mismatch(Vec<Mismatch>),
-    /// No result was given: name at least one.
     #[error("cannot compare results: none was given; name at least one RESULT.json")]
     NoResults,
-    /// A folder of results holds none: name another one.
     #[error(
         "'{}' holds no result; expected <name>.json or <method>/<name>.json below it, as `mateval eval score --out` writes it",
         folder.display()
     )]
     NoResultsBelow { folder: PathBuf },
-    /// A `.json` entry of a folder of results is a link or something else that is not a regular file: copy the file
-    /// there.
     #[error("'{}' is not a regular file; expected a file, not a link to one; copy it there", path.display())]
     NotAFile { path: PathBuf },
-    /// Files from which a leaderboard should be made cannot make one: every reason. Correct the files, or leave them out.
+    /// Every reason.
     #[error("these results cannot make a leaderboard:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
-    /// The results hold no score that can be shown: choose another protocol, or score again.
     #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
     NothingToShow {
         protocol: String,
         /// What was to be made of the scores, as in "a table".
         output: &'static str,
     },
-    /// A folder that is not a leaderboard would be replaced: choose another one.
     #[error("'{}' exists and is not a leaderboard; choose another --out", path.display())]
     NotALeaderboard { path: PathBuf },
-    /// A submission whose pictures should be shown belongs to none of the results: score it, or leave it out.
     #[error(
         "no result was made from the submission '{}' as it is now; score it, or leave it out of --submission",
         path.display()
     )]
     UnscoredSubmission { path: PathBuf },
-    /// The track `relit` has several pictures for each view, and none of them can be chosen: show another track.
     #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,
-    /// More houses than the bootstrap can draw from: rank fewer scenes.
+    /// More than the bootstrap can draw from.
     #[error("cannot rank scenes of {houses} houses; at most {most} are supported")]
     TooManyHouses { houses: usize, most: usize },
     /// The dataset could not be read, or a file could not be read or written.
@@ -83,19 +74,12 @@ fn joined(mismatches: &[Mismatch]) -> String {
 /// One reason. Methods are named as their submissions name them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Mismatch {
-    /// A result has no scores under the protocol.
     #[error(
         "the result of '{method}' has no scores under protocol '{protocol}', only under: {}; score it with \
          --protocol {protocol}, or choose another --protocol",
         scored.join(", ")
     )]
-    Protocol {
-        method: String,
-        protocol: String,
-        /// The protocols that the result has scores under.
-        scored: Vec<String>,
-    },
-    /// Two results depend on different datasets, protocols, scorers or LPIPS weights.
+    Protocol { method: String, protocol: String, scored: Vec<String> },
     #[error(
         "'{first}' and '{other}' have different fingerprints: dataset, protocol, scorer or LPIPS weights differ; \
          score both again with the same ones"
@@ -103,72 +87,39 @@ pub enum Mismatch {
     Fingerprints { first: String, other: String },
     #[error("'{first}' and '{other}' were scored on different scenes; score both on the same scenes")]
     Scenes { first: String, other: String },
-    /// A result covers fewer scenes than the others.
     #[error(
         "'{method}' was scored on {scored} of {scenes} scenes; score it on all, or add --partial to rank it on these"
     )]
-    TooFewScenes {
-        method: String,
-        /// The number of scenes that it was scored on.
-        scored: usize,
-        /// The number of scenes that any result covers.
-        scenes: usize,
-    },
-    /// Two results assign a scene to different houses.
+    TooFewScenes { method: String, scored: usize, scenes: usize },
     #[error("'{first}' and '{other}' assign scene '{scene}' to different houses: one was changed; score both again")]
     Houses { first: String, other: String, scene: SceneId },
-    /// A result does not state the house of a scene.
     #[error("the result of '{method}' does not state the house of scene '{scene}'; score it again with this version")]
     NoHouse { method: String, scene: SceneId },
     #[error("the result of '{method}' lists a scene twice; score it again")]
     RepeatedScene { method: String },
-    /// A result's fingerprint does not follow from the protocol, dataset, scenes and weights that it lists.
     #[error(
         "the result of '{method}' states fingerprint {stated}, but its protocol, dataset, scenes and weights give \
          {found}: it was changed; score it again"
     )]
-    Changed {
-        method: String,
-        stated: String,
-        /// The fingerprint that follows from the rest of the result.
-        found: String,
-    },
-    /// A result holds a number that no metric gives.
+    Changed { method: String, stated: String, found: String },
     #[error("the result of '{method}' holds {value:e} for '{key}', which is not a possible score; score it again")]
     ImpossibleScore { method: String, key: ResultKey, value: f64 },
-    /// A result was made by another version of the scorer.
     #[error("the result has scorer version {found}, expected {SCORER_VERSION}; score it again")]
     Scorer { found: u32 },
-    /// A result was made on another dataset, or on another version of it.
     #[error(
         "the result was made on {}, but the dataset '{}' is {}; use the dataset that was scored, or score again",
         expected, path.display(), found
     )]
-    Dataset {
-        expected: DatasetVersion,
-        /// Folder of the dataset that was given.
-        path: PathBuf,
-        found: DatasetVersion,
-    },
-    /// A result has no scores of a scene.
+    Dataset { expected: DatasetVersion, path: PathBuf, found: DatasetVersion },
     #[error("scene '{scene}' was not scored; choose one of: {}", ids(scored))]
     SceneNotScored { scene: SceneId, scored: Vec<SceneId> },
-    /// A submission is not the one that was scored, or has changed since. One hash covers all of its files, so that it
-    /// does not show which file differs.
+    /// One hash covers all files of a submission, so that it does not show which file differs.
     #[error(
         "the result was made from {}, but the submission '{}' is {}, hashed over submission.json and its {maps} maps of \
          the scored scenes: it is another one, or a file has changed; score it again",
         expected, path.display(), found
     )]
-    Submission {
-        expected: SubmissionVersion,
-        /// Folder of the submission that was given.
-        path: PathBuf,
-        found: SubmissionVersion,
-        /// The number of maps that were hashed.
-        maps: usize,
-    },
-    /// A score that was computed again differs from the result's.
+    Submission { expected: SubmissionVersion, path: PathBuf, found: SubmissionVersion, maps: usize },
     #[error(
         "'{key}' of scene '{scene}' is {} in the result, but {found} computed again: the result was changed, or made by \
          another version; score it again",
@@ -182,7 +133,6 @@ pub enum Mismatch {
 pub struct DatasetVersion {
     pub name: String,
     pub version: String,
-    /// SHA-256 of its manifest, hex.
     pub manifest_sha256: String,
 }
 
@@ -190,7 +140,6 @@ pub struct DatasetVersion {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubmissionVersion {
     pub method: String,
-    /// The hash over its files.
     pub sha256: String,
 }
 

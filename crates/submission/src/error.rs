@@ -8,37 +8,24 @@ use mateval_scene::{Finding, Severity};
 /// Why a submission could not be read or checked.
 #[derive(Debug, thiserror::Error)]
 pub enum SubmissionError {
-    /// The file system refused.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
         /// What was tried, as in "read" or "write".
         action: &'static str,
         path: PathBuf,
-        /// What the system reported.
         source: std::io::Error,
     },
-    /// Neither a folder nor an archive of a known kind.
     #[error("cannot open '{}' as a submission: expected a folder, a .zip or a .tar.gz{hint}", path.display())]
     UnknownKind {
-        /// What was named.
         path: PathBuf,
         /// What it is instead, as a sentence's end; empty where that is unknown.
         hint: Cow<'static, str>,
     },
-    /// An archive that is refused.
     #[error("cannot unpack '{}':{}", path.display(), Finding::list(findings))]
-    Archive {
-        path: PathBuf,
-        /// What is wrong with it; at least one.
-        findings: Vec<Finding>,
-    },
+    Archive { path: PathBuf, findings: Vec<Finding> },
     /// A file of the submission that nothing can replace.
     #[error("cannot use '{}': {fault}", path.display())]
-    File {
-        path: PathBuf,
-        /// What is wrong with it.
-        fault: FileFault,
-    },
+    File { path: PathBuf, fault: FileFault },
     /// The public files of the dataset contradict each other.
     #[error("cannot check against '{}': {fault}; run `mateval prep verify`", scene_file.display())]
     UnsoundScene { scene_file: PathBuf, fault: SceneFault },
@@ -64,17 +51,10 @@ impl SubmissionError {
 /// What the public files of a scene contradict.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SceneFault {
-    /// Every scene has one.
     #[error("expected an input view, found none")]
     NoInputView,
-    /// A picture of the input view is not as large as its camera says.
     #[error("expected pictures of {}x{} pixels for the input view, found one of {}x{}", expected[0], expected[1], found[0], found[1])]
-    PictureSize {
-        /// Width and height by the camera.
-        expected: [usize; 2],
-        /// Width and height of the picture.
-        found: [usize; 2],
-    },
+    PictureSize { expected: [usize; 2], found: [usize; 2] },
 }
 
 /// The fault of one file. `eval lint` reports it as a finding. Scoring replaces the map by its default, or, if only a few

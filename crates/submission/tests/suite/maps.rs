@@ -1,5 +1,5 @@
-//! The maps of untrusted submissions: malicious and broken pictures are read or refused within limits; of bad texels lint
-//! reports what scoring reads.
+//! The maps of untrusted submissions: malicious and broken pictures are read or refused within limits, and lint reports the
+//! same bad texels that scoring replaces.
 
 use std::cell::Cell;
 use std::io::Write as _;
