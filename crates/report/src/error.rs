@@ -1,94 +1,63 @@
-//! The error of this crate, split by what a caller can do about it.
+//! The error of this crate, split by what a caller can do about it, and why a result cannot stand beside another one, or
+//! does not match the dataset or the submission that it names.
 
+use std::fmt;
 use std::path::PathBuf;
 
-use mateval_scene::Finding;
-
-use crate::mismatch::Mismatch;
+use mateval_eval::protocol::SCORER_VERSION;
+use mateval_eval::result::ResultFile;
+use mateval_eval::result_key::ResultKey;
+use mateval_scene::{Finding, SceneId};
 
 /// Why results could not be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// Results cannot be shown together, or do not match the dataset or the submission: every reason. Score again, or
-    /// choose other inputs.
+    /// Results cannot be shown together, or do not match the dataset or the submission: every reason.
     #[error("{}", joined(.0))]
     Mismatch(Vec<Mismatch>),
-    /// No result was given: name at least one.
     #[error("cannot compare results: none was given; name at least one RESULT.json")]
     NoResults,
-    /// A folder of results holds none: name another one.
     #[error(
         "'{}' holds no result; expected <name>.json or <method>/<name>.json below it, as `mateval eval score --out` writes it",
         folder.display()
     )]
-    NoResultsBelow {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// A `.json` entry of a folder of results is a link or something else that is not a regular file: copy the file
-    /// there.
+    NoResultsBelow { folder: PathBuf },
     #[error("'{}' is not a regular file; expected a file, not a link to one; copy it there", path.display())]
-    NotAFile {
-        /// The entry of the folder.
-        path: PathBuf,
-    },
-    /// Files from which a leaderboard should be made cannot make one: every reason. Correct the files, or leave them out.
+    NotAFile { path: PathBuf },
+    /// Every reason.
     #[error("these results cannot make a leaderboard:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
-    /// The results hold no score that can be shown: choose another protocol, or score again.
     #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
     NothingToShow {
-        /// The protocol that was asked for.
         protocol: String,
         /// What was to be made of the scores, as in "a table".
         output: &'static str,
     },
-    /// A folder that is not a leaderboard would be replaced: choose another one.
     #[error("'{}' exists and is not a leaderboard; choose another --out", path.display())]
-    NotALeaderboard {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A submission whose pictures should be shown belongs to none of the results: score it, or leave it out.
+    NotALeaderboard { path: PathBuf },
     #[error(
         "no result was made from the submission '{}' as it is now; score it, or leave it out of --submission",
         path.display()
     )]
-    UnscoredSubmission {
-        /// The folder of the submission.
-        path: PathBuf,
-    },
-    /// The track `relit` has several pictures for each view, and none of them can be chosen: show another track.
+    UnscoredSubmission { path: PathBuf },
     #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,
-    /// More houses than the bootstrap can draw from: rank fewer scenes.
+    /// More than the bootstrap can draw from.
     #[error("cannot rank scenes of {houses} houses; at most {most} are supported")]
-    TooManyHouses {
-        /// The number of houses.
-        houses: usize,
-        /// The largest number that is supported.
-        most: usize,
-    },
+    TooManyHouses { houses: usize, most: usize },
     /// The dataset could not be read, or a file could not be read or written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
     /// A scene could not be rendered or scored again.
     #[error(transparent)]
     Eval(#[from] mateval_eval::EvalError),
-    /// The submission could not be read.
     #[error(transparent)]
     Submission(#[from] mateval_submission::SubmissionError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-    /// Two pictures could not be compared.
     #[error("cannot compare {what}: {source}")]
-    Metric {
-        /// Which pictures.
-        what: String,
-        /// Why not.
-        source: mateval_metrics::MetricError,
-    },
+    Metric { what: String, source: mateval_metrics::MetricError },
 }
 
 impl ReportError {
@@ -100,4 +69,102 @@ impl ReportError {
 
 fn joined(mismatches: &[Mismatch]) -> String {
     mismatches.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
+
+/// One reason. Methods are named as their submissions name them.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Mismatch {
+    #[error(
+        "the result of '{method}' has no scores under protocol '{protocol}', only under: {}; score it with \
+         --protocol {protocol}, or choose another --protocol",
+        scored.join(", ")
+    )]
+    Protocol { method: String, protocol: String, scored: Vec<String> },
+    #[error(
+        "'{first}' and '{other}' have different fingerprints: dataset, protocol, scorer or LPIPS weights differ; \
+         score both again with the same ones"
+    )]
+    Fingerprints { first: String, other: String },
+    #[error("'{first}' and '{other}' were scored on different scenes; score both on the same scenes")]
+    Scenes { first: String, other: String },
+    #[error(
+        "'{method}' was scored on {scored} of {scenes} scenes; score it on all, or add --partial to rank it on these"
+    )]
+    TooFewScenes { method: String, scored: usize, scenes: usize },
+    #[error("'{first}' and '{other}' assign scene '{scene}' to different houses: one was changed; score both again")]
+    Houses { first: String, other: String, scene: SceneId },
+    #[error("the result of '{method}' does not state the house of scene '{scene}'; score it again with this version")]
+    NoHouse { method: String, scene: SceneId },
+    #[error("the result of '{method}' lists a scene twice; score it again")]
+    RepeatedScene { method: String },
+    #[error(
+        "the result of '{method}' states fingerprint {stated}, but its protocol, dataset, scenes and weights give \
+         {found}: it was changed; score it again"
+    )]
+    Changed { method: String, stated: String, found: String },
+    #[error("the result of '{method}' holds {value:e} for '{key}', which is not a possible score; score it again")]
+    ImpossibleScore { method: String, key: ResultKey, value: f64 },
+    #[error("the result has scorer version {found}, expected {SCORER_VERSION}; score it again")]
+    Scorer { found: u32 },
+    #[error(
+        "the result was made on {}, but the dataset '{}' is {}; use the dataset that was scored, or score again",
+        expected, path.display(), found
+    )]
+    Dataset { expected: DatasetVersion, path: PathBuf, found: DatasetVersion },
+    #[error("scene '{scene}' was not scored; choose one of: {}", ids(scored))]
+    SceneNotScored { scene: SceneId, scored: Vec<SceneId> },
+    /// One hash covers all files of a submission, so that it does not show which file differs.
+    #[error(
+        "the result was made from {}, but the submission '{}' is {}, hashed over submission.json and its {maps} maps of \
+         the scored scenes: it is another one, or a file has changed; score it again",
+        expected, path.display(), found
+    )]
+    Submission { expected: SubmissionVersion, path: PathBuf, found: SubmissionVersion, maps: usize },
+    #[error(
+        "'{key}' of scene '{scene}' is {} in the result, but {found} computed again: the result was changed, or made by \
+         another version; score it again",
+        expected.map_or("missing".to_owned(), |expected| expected.to_string())
+    )]
+    Score { key: ResultKey, scene: SceneId, expected: Option<f64>, found: f64 },
+}
+
+/// A dataset, as a result names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DatasetVersion {
+    pub name: String,
+    pub version: String,
+    pub manifest_sha256: String,
+}
+
+/// A submission, as a result names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SubmissionVersion {
+    pub method: String,
+    pub sha256: String,
+}
+
+impl fmt::Display for DatasetVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}' {} with manifest {}", self.name, self.version, self.manifest_sha256)
+    }
+}
+
+impl fmt::Display for SubmissionVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}' with hash {}", self.method, self.sha256)
+    }
+}
+
+impl Mismatch {
+    /// The reason for which a result has no scores under a protocol, if it has none.
+    pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
+        let method = result.shown_method();
+        let scored = || result.protocols.keys().cloned().collect();
+        let is_scored = result.protocols.contains_key(protocol);
+        (!is_scored).then(|| Self::Protocol { method, protocol: protocol.to_owned(), scored: scored() })
+    }
+}
+
+fn ids(scenes: &[SceneId]) -> String {
+    scenes.iter().map(SceneId::as_str).collect::<Vec<_>>().join(", ")
 }

@@ -35,7 +35,6 @@ pub enum Shown {
     /// Renders under a track of the protocol that has it, with errors of sRGB values. Not [`Track::Relit`], which has
     /// several lights.
     Light {
-        /// The track.
         track: Track,
         /// Samples per pixel in each of two halves.
         samples: u32,
@@ -52,7 +51,6 @@ pub struct StripPlan<'a> {
     pub scenes: &'a [SceneId],
     /// What to show, in a pair of files each.
     pub shown: &'a [Shown],
-    /// The folder of the pictures.
     pub out: &'a Path,
     /// Whether existing pictures are replaced.
     pub force: bool,

@@ -1,57 +1,34 @@
-//! The one error of this crate.
+//! What can be wrong with a submission: errors that end a run, faults of single files, findings.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::Finding;
-
-use crate::file_fault::FileFault;
+use mateval_scene::{Finding, Severity};
 
 /// Why a submission could not be read or checked.
 #[derive(Debug, thiserror::Error)]
 pub enum SubmissionError {
-    /// The file system refused.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
         /// What was tried, as in "read" or "write".
         action: &'static str,
-        /// The file or folder.
         path: PathBuf,
-        /// What the system reported.
         source: std::io::Error,
     },
-    /// Neither a folder nor an archive of a known kind.
     #[error("cannot open '{}' as a submission: expected a folder, a .zip or a .tar.gz{hint}", path.display())]
     UnknownKind {
-        /// What was named.
         path: PathBuf,
         /// What it is instead, as a sentence's end; empty where that is unknown.
         hint: Cow<'static, str>,
     },
-    /// An archive that is refused.
     #[error("cannot unpack '{}':{}", path.display(), Finding::list(findings))]
-    Archive {
-        /// The archive.
-        path: PathBuf,
-        /// What is wrong with it; at least one.
-        findings: Vec<Finding>,
-    },
+    Archive { path: PathBuf, findings: Vec<Finding> },
     /// A file of the submission that nothing can replace.
     #[error("cannot use '{}': {fault}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        fault: FileFault,
-    },
+    File { path: PathBuf, fault: FileFault },
     /// The public files of the dataset contradict each other.
     #[error("cannot check against '{}': {fault}; run `mateval prep verify`", scene_file.display())]
-    UnsoundScene {
-        /// The scene's `scene.json`.
-        scene_file: PathBuf,
-        /// The contradiction.
-        fault: SceneFault,
-    },
+    UnsoundScene { scene_file: PathBuf, fault: SceneFault },
     /// The dataset or the submission could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
@@ -74,15 +51,80 @@ impl SubmissionError {
 /// What the public files of a scene contradict.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SceneFault {
-    /// Every scene has one.
     #[error("expected an input view, found none")]
     NoInputView,
-    /// A picture of the input view is not as large as its camera says.
     #[error("expected pictures of {}x{} pixels for the input view, found one of {}x{}", expected[0], expected[1], found[0], found[1])]
-    PictureSize {
-        /// Width and height by the camera.
-        expected: [usize; 2],
-        /// Width and height of the picture.
-        found: [usize; 2],
-    },
+    PictureSize { expected: [usize; 2], found: [usize; 2] },
+}
+
+/// The fault of one file. `eval lint` reports it as a finding. Scoring replaces the map by its default, or, if only a few
+/// texels are bad, those.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileFault {
+    /// A stable word, as in `not_square`.
+    pub code: &'static str,
+    /// Where in the file, as in `texel (3, 2)`; empty for the whole file.
+    pub place: String,
+    /// What was expected and what was found.
+    pub message: String,
+    /// What to do.
+    pub action: &'static str,
+}
+
+impl FileFault {
+    pub(crate) fn new(code: &'static str, message: impl Into<String>, action: &'static str) -> Self {
+        Self { code, place: String::new(), message: message.into(), action }
+    }
+
+    /// The finding about `file`, a path in the submission.
+    pub(crate) fn into_finding(self, severity: Severity, file: String) -> Finding {
+        let Self { code, place, message, action } = self;
+        Finding { severity, code: code.to_owned(), file, place, message, action: action.to_owned() }
+    }
+
+    /// A file that the system does not let us read.
+    pub(crate) fn unreadable(error: &std::io::Error) -> Self {
+        Self::new("unreadable_file", error.to_string(), "make it an ordinary file that can be read")
+    }
+}
+
+impl std::fmt::Display for FileFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if !self.place.is_empty() {
+            write!(f, "{}: ", self.place)?;
+        }
+        write!(f, "{}; {}", self.message, self.action)
+    }
+}
+
+/// A fault that scoring refuses, or replaces by a default.
+pub(crate) fn error(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
+    finding(Severity::Error, code, file, message, action)
+}
+
+/// Something that is scored, but probably a mistake.
+pub(crate) fn warning(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
+    finding(Severity::Warning, code, file, message, action)
+}
+
+/// Something for information.
+pub(crate) fn note(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
+    finding(Severity::Note, code, file, message, action)
+}
+
+pub(crate) fn finding(
+    severity: Severity,
+    code: &str,
+    file: &str,
+    message: impl Into<String>,
+    action: impl Into<String>,
+) -> Finding {
+    Finding {
+        severity,
+        code: code.to_owned(),
+        file: file.to_owned(),
+        place: String::new(),
+        message: message.into(),
+        action: action.into(),
+    }
 }

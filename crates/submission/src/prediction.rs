@@ -1,4 +1,4 @@
-//! The maps that a submission holds for one scene, ready to be rendered.
+//! The maps that a submission holds for one scene, ready to be rendered; and the hash of all of them, without decoding any.
 //!
 //! A missing or unusable map is replaced by a default, which is scored and reported as a finding. A map that the format
 //! makes optional may be missing without a finding.
@@ -8,17 +8,17 @@ use std::path::Path;
 use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::open::Dataset;
 use mateval_scene::submission::Map;
-use mateval_scene::{Finding, SceneError, Severity};
+use mateval_scene::{Finding, SceneError, SceneId, Severity};
 
-use crate::atlas_meshes::AtlasMeshes;
-use crate::default_map::default_value;
-use crate::file_fault::FileFault;
-use crate::hashed_file::HashedFile;
-use crate::map_file::{self, MAX_MAP_BYTES, MapFile};
-use crate::map_folder::MapFolder;
-use crate::memory_budget::MemoryBudget;
-use crate::submitted_file::{SubmittedFile, relative};
+use crate::atlas::AtlasMeshes;
+use crate::error::{FileFault, SubmissionError, finding};
+use crate::files::{HashedFile, MapFolder, SubmissionJson, SubmittedFile, relative, submission_sha256};
+use crate::map_file::{self, MAX_MAP_BYTES, MapFile, default_value};
+
+/// Most bytes that the texels of a scene's maps may take in memory together.
+pub const MAX_SCENE_BYTES: usize = 8 << 30;
 
 /// One instance's maps. A map with the same value everywhere has one texel.
 #[derive(Clone, Debug)]
@@ -32,7 +32,6 @@ pub struct PredictedMaterial {
 }
 
 impl PredictedMaterial {
-    /// A map's texture.
     pub fn texture(&self, map: Map) -> &Texture {
         match map {
             Map::BaseColor => &self.base_color,
@@ -157,14 +156,8 @@ impl Reader<'_> {
             Map::Roughness => format!("roughness {value}"),
             Map::Metallic => format!("metallic {value}"),
         };
-        Finding {
-            severity: Severity::Warning,
-            code: code.to_owned(),
-            file: relative(self.submission, path),
-            place: String::new(),
-            message: message.to_owned(),
-            action: format!("scored as {scored}"),
-        }
+        let file = relative(self.submission, path);
+        finding(Severity::Warning, code, &file, message, format!("scored as {scored}"))
     }
 }
 
@@ -197,19 +190,96 @@ pub fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
     sha256_of_bytes(text.as_bytes())
 }
 
+/// What identifies a submission: enough to see whether a result belongs to it, without a look at what its files hold.
+pub struct HashedSubmission {
+    /// The method's name, from `submission.json`.
+    pub method: String,
+    /// As results of the same scenes have it; see [`submission_sha256`].
+    pub sha256: String,
+    /// How many maps the hash is over.
+    pub maps: usize,
+}
+
+/// The files of a submission, each hashed once, from which the hash over any of its scenes follows.
+pub struct HashedFiles {
+    method: String,
+    json: HashedFile,
+    /// The maps of each scene, in the dataset's order.
+    scenes: Vec<(SceneId, Vec<HashedFile>)>,
+}
+
+impl HashedFiles {
+    /// Reads `submission.json` and the maps of these scenes; of all scenes if none is given.
+    pub fn read(submission: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<Self, SubmissionError> {
+        let json = SubmissionJson::read(submission)?;
+        let chosen = dataset.chosen_scenes(scenes)?;
+        let scenes = chosen.into_iter().map(|scene| (scene.id.clone(), map_hashes(submission, scene))).collect();
+        Ok(Self { method: json.file.method, json: json.hashed, scenes })
+    }
+
+    /// The submission as a result of the scenes for which `is_scored` holds identifies it.
+    pub fn over(&self, is_scored: impl Fn(&SceneId) -> bool) -> HashedSubmission {
+        let maps = self.scenes.iter().filter(|(scene, _)| is_scored(scene)).flat_map(|(_, maps)| maps);
+        let files: Vec<HashedFile> = std::iter::once(&self.json).chain(maps).cloned().collect();
+        HashedSubmission { method: self.method.clone(), sha256: submission_sha256(&files), maps: files.len() - 1 }
+    }
+}
+
+/// Hashes `submission.json` and the maps of these scenes. A result has the same hash if it was made of the same files.
+pub fn hashed_submission(
+    submission: &Path,
+    dataset: &Dataset,
+    scenes: &[SceneId],
+) -> Result<HashedSubmission, SubmissionError> {
+    Ok(HashedFiles::read(submission, dataset, scenes)?.over(|_| true))
+}
+
+/// The maps of a scene in the order of [`PredictedScene::files`]; those that cannot be read have no
+/// hash.
+fn map_hashes(submission: &Path, scene: &SceneFile) -> Vec<HashedFile> {
+    let with_atlas = scene.instances.iter().filter(|instance| instance.atlas.is_some());
+    let paths = with_atlas.flat_map(|instance| {
+        let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
+        Map::ALL.into_iter().flat_map(move |map| folder.present(map))
+    });
+    let read = paths.filter_map(|path| SubmittedFile::read(submission, &path, MAX_MAP_BYTES).ok());
+    read.map(|file| file.hashed().clone()).collect()
+}
+
+/// The memory that is left for the texels of a scene.
+pub(crate) struct MemoryBudget {
+    bytes_left: usize,
+}
+
+impl MemoryBudget {
+    /// The budget of a scene, none of it used.
+    pub(crate) fn of_scene() -> Self {
+        Self { bytes_left: MAX_SCENE_BYTES }
+    }
+
+    /// Gives the texture back and counts its texels; none where they exceed the budget.
+    pub(crate) fn holding(&mut self, texture: Texture) -> Option<Texture> {
+        self.bytes_left = self.bytes_left.checked_sub(texture.bytes().len())?;
+        Some(texture)
+    }
+
+    /// What is wrong where the budget is exceeded.
+    pub(crate) fn exceeded() -> String {
+        format!("the maps of its scene take more than {MAX_SCENE_BYTES} bytes together")
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-    use std::path::PathBuf;
-    use std::sync::atomic::{AtomicBool, Ordering};
-
+    use super::*;
     use glam::{Vec2, Vec3};
     use mateval_image::exr_io::{self, Precision};
     use mateval_image::{LinearRgb, Picture, png_io};
     use mateval_scene::TriangleMesh;
     use serde_json::json;
-
-    use super::*;
+    use std::collections::BTreeMap;
+    use std::path::PathBuf;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     /// A scene of an instance `a` with an atlas, a pane without, and `b`.
     fn scene() -> SceneFile {
@@ -473,5 +543,13 @@ mod tests {
         let expected: Vec<_> =
             versions.iter().enumerate().map(|(at, (_, sha256, _))| (Some(at), Some(sha256.clone()))).collect();
         assert_eq!(reads.keys().cloned().collect::<Vec<_>>(), expected, "{reads:?}");
+    }
+
+    #[test]
+    fn textures_are_counted_until_the_budget_is_used_up() {
+        let texture = |side: usize| Texture::new(side, side, Texels::Grey8(vec![0; side * side]), Wrap::Clamp).unwrap();
+        let mut budget = MemoryBudget { bytes_left: 150 };
+        assert!(budget.holding(texture(10)).is_some() && budget.holding(texture(8)).is_none());
+        assert!(budget.holding(texture(7)).is_some() && budget.bytes_left == 1);
     }
 }

@@ -8,7 +8,7 @@ use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Hit, Ray, World};
 use rayon::prelude::*;
 
-use crate::coverage::{Coverage, Part};
+use crate::atlas::{Coverage, Part};
 
 /// How far in front of a place, along the normal, another surface may lie without hiding it, in units of the rounding
 /// of the largest coordinate: 0.01 mm at 10 m. That covers the rounding of rays, and is a tenth of the distance that
@@ -22,7 +22,6 @@ pub const LEAST_COSINE: f64 = 1e-3;
 /// A texel of an atlas of which at least a part lies on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTexel {
-    /// Its column.
     pub column: usize,
     /// The uv of the place that represents it; none where that is its centre.
     pub off_centre: Option<[f32; 2]>,

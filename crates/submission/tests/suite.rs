@@ -7,7 +7,6 @@
 
 mod suite {
     mod archives;
-    mod bad_texels;
-    mod hostile_pictures;
     mod lint;
+    mod maps;
 }

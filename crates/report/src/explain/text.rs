@@ -8,8 +8,7 @@ use mateval_scene::text_table::Table;
 use mateval_eval::result_key::{PictureKind, Views};
 
 use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
-use super::light::LIGHTS;
-use super::plan::WORST;
+use super::scores::{LIGHTS, WORST};
 use crate::strips::WHITE_ERROR;
 
 /// A picture of one of the worst instances.

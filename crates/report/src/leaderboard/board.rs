@@ -1,16 +1,19 @@
 //! Everything that the pages of a leaderboard are made from.
 
 use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_eval::result_key::PictureKind;
 use mateval_scene::SceneId;
 use mateval_scene::dataset_id::DatasetId;
+use mateval_scene::layout::INPUT;
+use serde::Serialize;
 
-use super::columns::{self, Column};
+use super::columns::{self, Column, MethodHead, standing};
+use super::entries::{LeaderboardPlan, Verified};
 use super::file::{Ceiling, LEADERBOARD_FORMAT, LeaderboardDataset, LeaderboardFile, LeaderboardMethod};
-use super::heads::{MethodHead, standing};
-use super::plan::LeaderboardPlan;
+use super::pictures::{ERROR, PictureSet, TRUTH, png_size};
 use super::rooms::{Room, Rooms};
-use super::verified::Verified;
-use crate::picture_set::PictureSet;
+use super::site::SiteWriter;
+use crate::error::{Mismatch, ReportError};
 use crate::ranking::file::{RankedMethod, Ranking};
 
 /// Everything that pages are made from. Results, scores and heads are in the order of the ranking's methods.
@@ -112,4 +115,66 @@ impl<'a> Board<'a> {
         let values = self.scores[at].scenes.get(scene);
         columns.iter().map(|column| Some(column.text(*values?.get(&column.key)?))).collect()
     }
+}
+
+/// The scores of the truth's `result`. Fails if it was not scored on the scenes and under the rules of the ranking.
+pub(super) fn ceiling(result: &ResultFile, ranking: &Ranking) -> Result<Ceiling, ReportError> {
+    let mut mismatches: Vec<Mismatch> = Mismatch::of_result(result, &ranking.protocol).into_iter().collect();
+    let first = ranking.methods.first().map_or_else(String::new, |method| method.method.clone());
+    let other = result.method.clone();
+    let scores = result.protocols.get(&ranking.protocol);
+    if result.dataset.scenes != ranking.scenes {
+        mismatches.push(Mismatch::Scenes { first, other });
+    } else if scores.is_some_and(|scores| scores.fingerprint != ranking.fingerprint) {
+        mismatches.push(Mismatch::Fingerprints { first, other });
+    }
+    ReportError::refuse(mismatches)?;
+    let (values, standard_errors_db) =
+        scores.map(|scores| (scores.summary.clone(), scores.summary_noise.clone())).unwrap_or_default();
+    Ok(Ceiling { method: result.method.clone(), values, standard_errors_db })
+}
+
+/// The kinds that are shown where they exist: the albedo, and the room in the light of its own lamps.
+pub(super) const KINDS: [PictureKind; 2] = [PictureKind::Albedo, PictureKind::RgbTrue];
+
+/// A prediction of one kind beside the truth, in the input view. Paths are relative to the site.
+#[derive(Serialize)]
+pub(super) struct Comparison<'a> {
+    scene: &'a str,
+    method: &'a str,
+    /// The title of the kind of picture, such as `Albedo`.
+    kind: String,
+    prediction: String,
+    truth: String,
+    width: u32,
+    height: u32,
+}
+
+/// The comparisons of a method in a scene: those of [`KINDS`], or of the first kind that both have if there are none.
+pub(super) fn comparisons<'a>(
+    board: &Board<'_>,
+    site: &SiteWriter<'_>,
+    method: &'a MethodHead,
+    scene: &'a SceneId,
+) -> Vec<Comparison<'a>> {
+    let truth = board.pictures.kinds(TRUTH, scene, INPUT);
+    let predicted = board.pictures.kinds(&method.id, scene, INPUT);
+    let both: Vec<&str> = predicted.into_iter().filter(|kind| truth.contains(kind) && !kind.ends_with(ERROR)).collect();
+    let known: Vec<&str> = KINDS.iter().map(|kind| kind.word()).filter(|kind| both.contains(kind)).collect();
+    let shown = if known.is_empty() { both.into_iter().take(1).collect() } else { known };
+    let comparison = |word: &str| {
+        let place = |of: &str| format!("pictures/{of}/{scene}/{INPUT}/{word}.png");
+        let [width, height] = png_size(&site.path(&place(TRUTH))).unwrap_or([4, 3]);
+        let title = word.parse::<PictureKind>().map_or_else(|_| word.replace('_', " "), |kind| kind.title().to_owned());
+        Comparison {
+            scene: scene.as_str(),
+            method: &method.name,
+            kind: title,
+            prediction: place(&method.id),
+            truth: place(TRUTH),
+            width,
+            height,
+        }
+    };
+    shown.into_iter().map(comparison).collect()
 }

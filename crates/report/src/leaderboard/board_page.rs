@@ -1,27 +1,31 @@
-//! The board itself: one row for each method, one column for each number and each fact.
+//! The board itself: one row for each method, one column for each number and each fact; and the same numbers as files.
 
+use std::borrow::Cow;
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_scene::SceneId;
+use mateval_eval::result::{ProtocolResult, ResultFile, TracerCheck};
+use mateval_eval::result_key::ResultKey;
+use mateval_scene::{SceneId, json};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::board::Board;
-use super::columns::{Choices, Column, choices, shown};
-use super::comparison::{Comparison, comparisons};
-use super::facts::{FACTS, Fact, FactColumn, facts};
-use super::heads::{Cell, MethodHead, rank_text, standing};
+use super::board::{Board, Comparison, comparisons};
+use super::columns::{
+    Cell, Choices, Column, FACTS, Fact, FactColumn, MethodHead, choices, facts, rank_text, shown, standing,
+};
+use super::file::{LEADERBOARD_PATH, LeaderboardFile};
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
-use mateval_eval::result::TracerCheck;
-use mateval_eval::result_key::ResultKey;
-
-use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
+use crate::ranking::file::{Interval, KeyRanking, RankedMethod, Standing};
+use crate::tables::{Grouping, TableFormat, quoted, tables};
 
 /// The number of methods whose pictures the page opens with.
 const BEST: usize = 2;
+
+/// The tables in the paper's layout; not written if no result covers all scenes.
+const TABLES: &str = "downloads/tables.tex";
 
 #[derive(Serialize)]
 struct BoardPage<'a> {
@@ -104,7 +108,7 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         ceiling: ceiling_row(board, &columns),
         columns,
         tracer: TracerNote::of(board),
-        has_tables: site.path(super::downloads::TABLES).exists(),
+        has_tables: site.path(TABLES).exists(),
     };
     site.page(&Page {
         file: "index.html",
@@ -240,4 +244,79 @@ fn wins(key: ResultKey, ranking: &KeyRanking, methods: &[RankedMethod]) -> Strin
     }
     // JSON is also valid JavaScript.
     format!("boardWins({}, {});\n", serde_json::json!(key), serde_json::json!(table))
+}
+
+/// Writes the numbers of the leaderboard as files.
+pub(super) fn write_downloads(board: &Board<'_>, protocol: &str, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    site.file(LEADERBOARD_PATH, &json::to_text(&board.file))?;
+    site.file("downloads/leaderboard.csv", &standings_csv(&board.file))?;
+    // Tables compare only results that cover the same scenes.
+    let scenes = &board.ranking().scenes;
+    let is_whole = |result: &&ResultFile| result.dataset.scenes == *scenes;
+    let whole: Cow<'_, [ResultFile]> = match board.results.iter().all(|result| is_whole(&result)) {
+        true => board.results.into(),
+        false => board.results.iter().filter(is_whole).cloned().collect(),
+    };
+    if !whole.is_empty() {
+        for (file, format) in [(TABLES, TableFormat::Latex), ("downloads/tables.csv", TableFormat::Csv)] {
+            site.file(file, &tables(&whole, board.ceiling, protocol, Grouping::Dataset, format)?)?;
+        }
+    }
+    for (head, scores) in board.heads.iter().zip(&board.scores) {
+        site.file(&format!("methods/{}.csv", head.id), &scenes_csv(scenes, scores))?;
+    }
+    Ok(())
+}
+
+/// One line for each method and key.
+fn standings_csv(file: &LeaderboardFile) -> String {
+    let mut lines =
+        vec!["id,method,key,better,value,low,high,rank_best,rank_worst,scenes,houses,verified,partial".to_owned()];
+    for (ranked, method) in file.ranking.methods.iter().zip(&file.methods) {
+        for (key, ranking) in &file.ranking.keys {
+            let Some(standing) = ranking.standings.iter().find(|standing| standing.method == ranked.id) else {
+                continue;
+            };
+            let end = |of: fn(&Interval) -> f64| {
+                standing.interval.as_ref().map_or_else(String::new, |interval| of(interval).to_string())
+            };
+            lines.push(format!(
+                "{},{},{key},{},{},{},{},{},{},{},{},{},{}",
+                ranked.id,
+                quoted(&ranked.method),
+                word(&ranking.better),
+                standing.value,
+                end(|interval| interval.low),
+                end(|interval| interval.high),
+                standing.rank.best,
+                standing.rank.worst,
+                standing.scenes,
+                standing.houses,
+                word(&method.verified),
+                ranked.partial
+            ));
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// The word for a value in JSON.
+fn word<T: serde::Serialize>(value: &T) -> String {
+    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// One line for each scene, one column for each key.
+fn scenes_csv(scenes: &[SceneId], scores: &ProtocolResult) -> String {
+    let keys: BTreeSet<&ResultKey> = scores.scenes.values().flat_map(BTreeMap::keys).collect();
+    let mut lines = vec![
+        std::iter::once("scene".to_owned()).chain(keys.iter().map(ToString::to_string)).collect::<Vec<_>>().join(","),
+    ];
+    for scene in scenes {
+        let values = scores.scenes.get(scene);
+        let cells = keys
+            .iter()
+            .map(|key| values.and_then(|values| values.get(*key)).map_or_else(String::new, |value| value.to_string()));
+        lines.push(std::iter::once(scene.to_string()).chain(cells).collect::<Vec<_>>().join(","));
+    }
+    lines.join("\n") + "\n"
 }

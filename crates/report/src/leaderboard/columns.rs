@@ -1,14 +1,16 @@
-//! The columns of the board that hold scores: one for each key of the results, chosen by picture, views, metric and
-//! surfaces.
+//! The columns of the board and their cells: one column for each key of the results, chosen by picture, views, metric and
+//! surfaces, and one for each fact about methods. Also how pages name a method.
 
 use mateval_eval::metric::{Better, Metric};
+use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces, Views};
-use mateval_scene::submission::Map;
+use mateval_scene::submission::{Cost, Map};
 use serde::Serialize;
 
-use crate::ranking::file::Ranking;
+use super::entries::Verified;
+use super::file::LeaderboardMethod;
+use crate::ranking::file::{RankRange, RankedMethod, Ranking, Standing};
 
-/// A column of scores.
 #[derive(Clone, Serialize)]
 pub(super) struct Column {
     pub(super) key: ResultKey,
@@ -23,7 +25,6 @@ pub(super) struct Column {
     /// As in `PSNR`.
     pub(super) metric_title: &'static str,
     pub(super) better: Better,
-    /// Whether it is shown initially.
     pub(super) is_shown: bool,
 }
 
@@ -67,7 +68,6 @@ impl Column {
     }
 }
 
-/// Whether a column is shown initially.
 fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
     matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue | PictureKind::RgbFitted)
         && matches!(views, Views::Input | Views::Novel)
@@ -143,4 +143,174 @@ pub(super) fn choices(columns: &[Column]) -> Choices {
         ChoiceGroup { name, title, choices: words.iter().filter(|(word, _)| has(word, false)).map(choice).collect() }
     };
     Choices { groups: groups.map(group).into() }
+}
+
+/// The columns that hold no scores, from left to right, behind those that do: what is known about a method besides its
+/// numbers. A new column is one entry.
+pub(super) const FACTS: [FactColumn; 2] = [
+    FactColumn { key: "cost", title: "Seconds a scene", is_word: false, of: cost },
+    FactColumn { key: "licence", title: "Licence", is_word: true, of: licence },
+];
+
+/// The most characters of a text that a cell shows.
+const MOST_CHARACTERS: usize = 60;
+
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct FactColumn {
+    /// Its name in links to a sorted board.
+    key: &'static str,
+    title: &'static str,
+    /// Whether its cells hold words, which are aligned to the left.
+    is_word: bool,
+    /// Its cell for a method; none if the method does not state it.
+    #[serde(skip)]
+    of: fn(&LeaderboardMethod, &ProtocolResult) -> Option<Fact>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Fact {
+    /// What the column is sorted by: a number with all digits, or a word.
+    value: String,
+    text: String,
+    /// Small print below the text.
+    note: String,
+}
+
+/// A method's cells, one for each of [`FACTS`].
+pub(super) fn facts(method: &LeaderboardMethod, scores: &ProtocolResult) -> Vec<Option<Fact>> {
+    FACTS.iter().map(|column| (column.of)(method, scores)).collect()
+}
+
+fn cost(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
+    let cost = method.cost.as_ref()?;
+    let value = cost.seconds_a_scene.to_string();
+    Some(Fact { value, text: seconds(cost.seconds_a_scene), note: shortened(&cost.hardware) })
+}
+
+fn licence(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
+    let licence = method.licence.as_ref().filter(|licence| !licence.is_empty())?;
+    Some(Fact { value: licence.clone(), text: shortened(licence), note: String::new() })
+}
+
+/// Seconds, rounded. Submissions state any number, and a column has a limited width.
+fn seconds(seconds: f64) -> String {
+    match seconds {
+        1e7.. => format!("{seconds:.1e}"),
+        100.0.. => format!("{seconds:.0}"),
+        _ => format!("{seconds:.1}"),
+    }
+}
+
+/// The text, cut after [`MOST_CHARACTERS`].
+fn shortened(text: &str) -> String {
+    let cut = text.char_indices().nth(MOST_CHARACTERS);
+    cut.map_or_else(|| text.to_owned(), |(end, _)| format!("{}…", &text[..end]))
+}
+
+/// A method, as pages name it.
+#[derive(Clone, Serialize)]
+pub(super) struct MethodHead {
+    pub(super) id: String,
+    pub(super) name: String,
+    pub(super) verified: Verified,
+    description: String,
+    /// Only if it leads to a web page, as the submission is untrusted.
+    link: Option<String>,
+    licence: Option<String>,
+    cost: Option<Cost>,
+    /// Its cost, rounded.
+    seconds: String,
+    partial: bool,
+    /// The number of scenes that it is ranked on.
+    covered: usize,
+    /// The number of scenes of the leaderboard.
+    scenes: usize,
+    /// The number of scenes that the submission leaves out, scored as grey.
+    left_out: usize,
+    /// The stems of maps that the submission never contains.
+    not_predicted: Vec<String>,
+}
+
+impl MethodHead {
+    pub(super) fn new(
+        ranked: &RankedMethod,
+        method: &LeaderboardMethod,
+        result: &ResultFile,
+        ranking: &Ranking,
+    ) -> Self {
+        let is_page = |url: &String| url.starts_with("https://") || url.starts_with("http://");
+        let scenes = ranking.scenes.len();
+        Self {
+            id: ranked.id.clone(),
+            name: ranked.method.clone(),
+            verified: method.verified,
+            description: method.description.clone(),
+            link: method.url.clone().filter(is_page),
+            licence: method.licence.clone().filter(|licence| !licence.is_empty()),
+            seconds: method.cost.as_ref().map_or_else(String::new, |cost| seconds(cost.seconds_a_scene)),
+            cost: method.cost.clone(),
+            partial: ranked.partial,
+            covered: scenes - ranked.not_scored.len() - ranked.left_out.len(),
+            scenes,
+            left_out: ranked.left_out.len(),
+            not_predicted: result.not_predicted.clone(),
+        }
+    }
+}
+
+/// One number of a method with its interval and its ranks.
+#[derive(Serialize)]
+pub(super) struct Cell {
+    /// The number that scripts sort by.
+    value: String,
+    low: Option<String>,
+    high: Option<String>,
+    text: String,
+    interval: Option<String>,
+    rank: String,
+}
+
+impl Cell {
+    pub(super) fn new(column: &Column, standing: &Standing) -> Self {
+        let interval = standing.interval.as_ref();
+        Self {
+            value: seven_digits(standing.value),
+            low: interval.map(|interval| seven_digits(interval.low)),
+            high: interval.map(|interval| seven_digits(interval.high)),
+            text: column.text(standing.value),
+            interval: interval.map(|i| format!("{} – {}", column.text(i.low), column.text(i.high))),
+            rank: rank_text(standing.rank),
+        }
+    }
+}
+
+/// The value with seven digits, which a page does not need more of; the downloads have all digits.
+fn seven_digits(value: f64) -> String {
+    format!("{value:.6e}").parse().map_or_else(|_| value.to_string(), |rounded: f64| rounded.to_string())
+}
+
+/// `2`, or `2–5`.
+pub(super) fn rank_text(rank: RankRange) -> String {
+    if rank.best == rank.worst { rank.best.to_string() } else { format!("{}–{}", rank.best, rank.worst) }
+}
+
+/// The standing of a method by one number; none if it has no such number.
+pub(super) fn standing<'a>(ranking: &'a Ranking, key: ResultKey, method: &str) -> Option<&'a Standing> {
+    ranking.keys.get(&key)?.standings.iter().find(|standing| standing.method == method)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_stay_short() {
+        assert_eq!(
+            [0.04, 12.34, 99.96, 123.4, 9_999_999.0, 1e300].map(seconds),
+            ["0.0", "12.3", "100.0", "123", "9999999", "1.0e300"]
+        );
+        assert_eq!(shortened("MIT"), "MIT");
+        assert_eq!(shortened(&"é".repeat(60)), "é".repeat(60));
+        assert_eq!(shortened(&"é".repeat(61)), format!("{}…", "é".repeat(60)));
+    }
 }

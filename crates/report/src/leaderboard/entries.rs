@@ -1,36 +1,99 @@
-//! The entries of a board, read from their files. All files are checked before any is refused, so that the error lists
-//! everything that must change.
+//! What a board is made from: the files of a folder of results, read and checked. All files are checked before any is
+//! refused, so that the error lists everything that must change.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mateval_eval::EvalError;
 use mateval_eval::result::{PictureValues, ResultFile};
+use mateval_eval::result_key::{Region, Surfaces};
+use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::findings::shortened;
-use mateval_scene::{Finding, SceneError, Severity};
-use mateval_submission::method_name;
+use mateval_scene::layout::INPUT;
+use mateval_scene::manifest::sha256_of_file;
+use mateval_scene::open::Dataset;
+use mateval_scene::{Finding, SceneError, Severity, json};
+use mateval_submission::lint::submission_json::check_method_name;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::errata::ErrataFile;
-use super::results_folder::ResultsFolder;
-use super::verified::{self, Verified};
-use super::wide_curves;
 use crate::error::ReportError;
+use crate::ranking::file::Ranking;
+use crate::strips::Shown;
+
+/// The file of the truth's own result.
+const CEILING: &str = "ceiling.json";
+
+/// The file of errors that were found after publication.
+const ERRATA: &str = "errata.json";
+
+/// The format of this version of errata.
+pub const ERRATA_FORMAT: &str = "mateval-errata/1";
 
 /// What to do with a file that is not what a board expects in its place.
 const UNFIT: &str = "correct it, or leave it out: a folder of results holds NAME.json as `mateval eval score --out` \
                      writes it, NAME.verified.json as `mateval eval verify --out` writes it, and in the folder itself \
                      ceiling.json, a result, and errata.json";
 
+/// The files of a folder in which a leaderboard's results are collected, for example by pull requests.
+///
+/// `ceiling.json` and `errata.json` lie in the folder itself. Every other `.json` file, there or in a folder directly
+/// below it (for example one for each method), is a result or, if it ends in `.verified.json`, the verification of one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ResultsFolder {
+    /// The files of the methods' results, sorted; at least one if the folder was listed.
+    pub results: Vec<PathBuf>,
+    /// The file of the truth's result.
+    pub ceiling: Option<PathBuf>,
+    pub errata: Option<PathBuf>,
+}
+
+impl ResultsFolder {
+    /// Lists the folder. Fails where it holds no result, and where one of its `.json` files is a link, which could lead
+    /// out of the folder.
+    pub fn list(folder: &Path) -> Result<Self, ReportError> {
+        let mut found = Self::default();
+        let mut folders = Vec::new();
+        for (path, kind) in entries_of(folder)? {
+            match path.file_name().and_then(|name| name.to_str()) {
+                _ if kind.is_dir() => folders.push(path),
+                Some(CEILING) => found.ceiling = Some(regular_file(path, kind)?),
+                Some(ERRATA) => found.errata = Some(regular_file(path, kind)?),
+                name => found.add(name, path.clone(), kind)?,
+            }
+        }
+        for folder in folders {
+            for (path, kind) in entries_of(&folder)? {
+                found.add(path.file_name().and_then(|name| name.to_str()), path.clone(), kind)?;
+            }
+        }
+        if found.results.is_empty() {
+            return Err(ReportError::NoResultsBelow { folder: folder.to_owned() });
+        }
+        found.results.sort();
+        Ok(found)
+    }
+
+    /// Adds the file if its name is that of a result. Fails where it or a verification is a link.
+    fn add(&mut self, name: Option<&str>, path: PathBuf, kind: std::fs::FileType) -> Result<(), ReportError> {
+        let Some(name) = name.filter(|name| name.ends_with(".json") && !kind.is_dir()) else { return Ok(()) };
+        let path = regular_file(path, kind)?;
+        if !name.ends_with(".verified.json") {
+            self.results.push(path);
+        }
+        Ok(())
+    }
+}
+
 /// What a board is made from.
 #[derive(Debug, Default)]
 pub struct Entries {
     /// The results of the methods, with the scores of those single pictures alone that curves show.
     pub results: Vec<ResultFile>,
-    /// Whether each of them was verified.
     pub verified: Vec<Verified>,
     /// The result of the truth.
     pub ceiling: Option<ResultFile>,
-    /// The errata.
     pub errata: Option<ErrataFile>,
 }
 
@@ -41,8 +104,8 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
     let (mut entries, mut paths, mut findings) = (Entries::default(), Vec::new(), Vec::new());
     for path in &files.results {
         let Some(result) = read_result(path, &mut findings)? else { continue };
-        let sidecar = verified::sidecar(path);
-        let mark = fitting(verified::read(path, &result), "a verification", &sidecar, &mut findings)?;
+        let sidecar = sidecar(path);
+        let mark = fitting(verification_of(path, &result), "a verification", &sidecar, &mut findings)?;
         entries.verified.push(mark.unwrap_or(Verified::No));
         entries.results.push(result);
         paths.push(path.as_path());
@@ -63,6 +126,109 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
     if findings.is_empty() { Ok(entries) } else { Err(ReportError::UnfitFiles(findings)) }
 }
 
+pub struct LeaderboardPlan<'a> {
+    pub results: &'a [ResultFile],
+    /// The result of the truth itself, which is shown below the methods and not ranked.
+    pub ceiling: Option<&'a ResultFile>,
+    /// Whether each of the results was verified.
+    pub verified: Vec<Verified>,
+    /// The protocol whose scores are ranked.
+    pub protocol: &'a str,
+    /// Whether to accept results that lack some scenes.
+    pub partial: bool,
+    /// Faults that were found after publication.
+    pub errata: Option<&'a ErrataFile>,
+    /// A set of pictures to show; see `pictures`.
+    pub pictures: Option<&'a Path>,
+    /// Submissions to draw pictures of.
+    pub submissions: Option<Submissions<'a>>,
+    pub tool: String,
+}
+
+/// Submissions whose pictures are drawn.
+pub struct Submissions<'a> {
+    /// The dataset that they were scored on.
+    pub dataset: &'a Dataset,
+    pub folders: Vec<PathBuf>,
+    /// Which pictures are drawn of each.
+    pub shown: Vec<Shown>,
+}
+
+impl Submissions<'_> {
+    /// The dataset's scenes that are ranked, in its order.
+    pub(super) fn ranked_scenes(&self, ranking: &Ranking) -> Vec<&SceneFile> {
+        self.dataset.scenes.iter().filter(|scene| ranking.scenes.contains(&scene.id)).collect()
+    }
+}
+
+/// Whether a result was verified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verified {
+    /// It was not verified.
+    No,
+    /// `eval verify` computed the same numbers.
+    Confirmed,
+    /// `eval verify` computed different numbers.
+    Refuted,
+    /// The verification belongs to other bytes: the result, or what it was made from, has changed since.
+    Stale,
+}
+
+/// Errata, in the order in which they are shown.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ErrataFile {
+    /// Always `mateval-errata/1`.
+    pub format: String,
+    /// One entry for each error.
+    pub entries: Vec<Erratum>,
+}
+
+/// One error.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Erratum {
+    /// When it was found, as in `2026-03-01`.
+    pub date: String,
+    /// A title of a few words.
+    pub title: String,
+    /// What was wrong, and how it was corrected.
+    pub text: String,
+    /// Names of the methods and scenes that it affects; all of them if empty.
+    #[serde(default)]
+    pub affects: Vec<String>,
+}
+
+impl ErrataFile {
+    /// Reads the errata in the file `path`; fails if they have another format.
+    pub fn read(path: &Path) -> Result<Self, ReportError> {
+        Ok(json::read_format(path, ERRATA_FORMAT)?)
+    }
+}
+
+/// `DIR/NAME.verified.json` of `DIR/NAME.json`.
+pub fn sidecar(result: &Path) -> PathBuf {
+    result.with_extension("verified.json")
+}
+
+/// The state that the sidecar of the result in the file `path` gives; `result` is the content of that file.
+pub(super) fn verification_of(path: &Path, result: &ResultFile) -> Result<Verified, ReportError> {
+    let sidecar = sidecar(path);
+    if !sidecar.exists() {
+        return Ok(Verified::No);
+    }
+    let file: VerificationFile = json::read_format(&sidecar, VERIFICATION_FORMAT)?;
+    let is_of_these_bytes = file.result_sha256 == sha256_of_file(path)?
+        && file.submission_sha256 == result.submission.sha256
+        && file.dataset_manifest_sha256 == result.dataset.manifest_sha256;
+    Ok(match (is_of_these_bytes, file.confirmed) {
+        (false, _) => Verified::Stale,
+        (true, true) => Verified::Confirmed,
+        (true, false) => Verified::Refuted,
+    })
+}
+
 /// The result in the file, if it is one; what is wrong with it or with its method's name is added to the findings.
 fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<ResultFile>, ReportError> {
     let read = ResultFile::read(path).map_err(|error| match error {
@@ -70,11 +236,11 @@ fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<Result
         other => ReportError::Eval(other),
     });
     let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
-    let bad_name = method_name::check(&result.method, Severity::Error, &path.display().to_string());
+    let bad_name = check_method_name(&result.method, Severity::Error, &path.display().to_string());
     findings.extend(bad_name.map(|finding| Finding { place: "/method".to_owned(), ..finding }));
     // Single pictures are most of a result's memory, and the site shows those of curves alone.
     let wide_views = &result.dataset.wide_views;
-    let is_kept = |picture: &PictureValues| wide_views.contains_key(&picture.scene) && wide_curves::is_shown(picture);
+    let is_kept = |picture: &PictureValues| wide_views.contains_key(&picture.scene) && is_in_curves(picture);
     for scores in result.protocols.values_mut() {
         scores.pictures.retain(is_kept);
         scores.pictures.shrink_to_fit();
@@ -141,12 +307,29 @@ fn error(code: &str, path: &Path, place: &str, message: String, action: &str) ->
     }
 }
 
+/// Whether curves show the values of a picture, if its scene has wide views.
+pub(super) fn is_in_curves(picture: &PictureValues) -> bool {
+    let is_of_a_class = picture.view.is_wide() || picture.view.as_str() == INPUT;
+    is_of_a_class && picture.region == Region::Valid && picture.picture.surfaces == Surfaces::All
+}
+
+/// The entries of a folder with their types; a link is not followed.
+fn entries_of(folder: &Path) -> Result<Vec<(PathBuf, std::fs::FileType)>, SceneError> {
+    let entry = |entry: std::io::Result<std::fs::DirEntry>| {
+        let entry = entry?;
+        Ok((entry.path(), entry.file_type()?))
+    };
+    let all = folder.read_dir().and_then(|entries| entries.map(entry).collect());
+    all.map_err(SceneError::io("list", folder))
+}
+
+/// The path, if it is a regular file's.
+fn regular_file(path: PathBuf, kind: std::fs::FileType) -> Result<PathBuf, ReportError> {
+    if kind.is_file() { Ok(path) } else { Err(ReportError::NotAFile { path }) }
+}
+
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
-    use mateval_scene::json;
-
     use super::*;
     use crate::ranking::tests::{result, scores};
 
@@ -229,5 +412,51 @@ mod tests {
         let text = read(&files).unwrap_err().to_string();
         assert!(text.contains("expected a result, found: the format 'mateval-lint/1'"), "{text}");
         assert!(text.contains("a folder of results holds") && !text.contains("prep verify"), "{text}");
+    }
+
+    fn folder_of(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for name in files {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "{}").unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn results_are_found_by_their_place() {
+        let files = [
+            "b.json",
+            "ceiling.json",
+            "errata.json",
+            "README.md",
+            "a/RESULT.json",
+            "a/RESULT.verified.json",
+            "a/errata.json",
+            "c/notes.txt",
+            "c/deep/RESULT.json",
+        ];
+        let folder = folder_of(&files);
+        let found = ResultsFolder::list(folder.path()).unwrap();
+        let at = |name: &str| folder.path().join(name);
+        assert_eq!(found.results, ["a/RESULT.json", "a/errata.json", "b.json"].map(at));
+        assert_eq!((found.ceiling, found.errata), (Some(at("ceiling.json")), Some(at("errata.json"))));
+    }
+
+    #[test]
+    fn a_folder_without_results_and_links_are_refused() {
+        let no_result = folder_of(&["ceiling.json", "a/RESULT.verified.json"]);
+        let refused = ResultsFolder::list(no_result.path());
+        assert!(matches!(refused, Err(ReportError::NoResultsBelow { .. })), "{refused:?}");
+        let with_link = folder_of(&["a/RESULT.json", "b/notes.txt"]);
+        for name in ["b/RESULT.json", "a/RESULT.verified.json"] {
+            assert_eq!(ResultsFolder::list(with_link.path()).unwrap().results.len(), 1);
+            std::os::unix::fs::symlink("/etc/passwd", with_link.path().join(name)).unwrap();
+            let refused = ResultsFolder::list(with_link.path());
+            assert!(matches!(refused, Err(ReportError::NotAFile { .. })), "{refused:?}");
+            std::fs::remove_file(with_link.path().join(name)).unwrap();
+        }
+        assert!(ResultsFolder::list(&with_link.path().join("none")).is_err());
     }
 }

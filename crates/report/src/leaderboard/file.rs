@@ -1,14 +1,12 @@
 //! `leaderboard.json`: everything that a leaderboard shows about its methods, for programs.
 
-use std::collections::BTreeMap;
-
+use super::entries::Verified;
+use crate::ranking::file::Ranking;
 use mateval_eval::result_key::ResultKey;
 use mateval_scene::submission::Cost;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use super::verified::Verified;
-use crate::ranking::file::Ranking;
+use std::collections::BTreeMap;
 
 /// The format of this version of leaderboards.
 pub const LEADERBOARD_FORMAT: &str = "mateval-leaderboard/1";

@@ -3,25 +3,21 @@
 
 use std::collections::BTreeMap;
 
+use mateval_eval::metric::Metric;
+use mateval_eval::result::InstancePixelErrors;
+use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 use mateval_scene::SceneId;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::board::Board;
-use super::columns::{Column, headlines, shown};
-use super::comparison::{Comparison, comparisons};
-use super::heads::{Cell, MethodHead, standing};
+use super::board::{Board, Comparison, comparisons};
+use super::columns::{Cell, Column, MethodHead, headlines, shown, standing};
+use super::entries::Verified;
 use super::site::{Page, SiteWriter};
-use super::verified::Verified;
 use crate::error::ReportError;
 use crate::ranking::file::Pair;
-use crate::tables::Grouping;
-use crate::tables::pooled::pooled;
-use crate::tables::value::{CellKey, Value};
-use mateval_eval::metric::Metric;
-use mateval_eval::result::InstancePixelErrors;
-use mateval_eval::result_key::{PictureKind, ResultKey, Views};
+use crate::tables::{CellKey, Grouping, Value, pooled};
 
 /// The numbers of worst scenes and instances that are shown.
 const WORST_SCENES: usize = 5;

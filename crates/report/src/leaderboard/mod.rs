@@ -3,56 +3,34 @@
 //! In: results under one protocol, and optionally pictures. Out: a folder with pages for the board, for each method and
 //! scene, for the protocol, the paper's own numbers and errata, and with the numbers as files.
 //!
-//! `results_folder` lists the files of a folder, and `entries` reads them and refuses those that cannot make a board.
-//! `board` gathers what pages show: `columns` of scores, `facts` about methods, `heads` that name a method, `pictures`,
-//! of which `comparison` chooses those beside the truth, and `rooms` in 3D. Each page has a file that collects the
-//! values for its template in `templates`, and `site` writes it. No page needs a server or loads anything from
-//! elsewhere.
+//! `entries` lists the files of a folder, reads them and refuses those that cannot make a board. `pictures` and `rooms`
+//! gather what is shown beside numbers. `board` holds all of it, with the `columns` of scores and facts about methods.
+//! The other files are pages: each collects the values for its template in `templates`, and `site` writes it. No page
+//! needs a server or loads anything from elsewhere.
 
 mod board;
 mod board_page;
-mod ceiling;
-mod chart;
 mod columns;
-mod comparison;
-mod downloads;
+mod curves;
 pub mod entries;
-pub mod errata;
-mod facts;
 pub mod file;
-mod heads;
 mod method_page;
-mod named_submission;
-mod paper;
-mod perturbed;
 mod pictures;
-mod plan;
-mod protocol_page;
-pub mod results_folder;
-mod room_maps;
-mod room_page;
+mod reference_pages;
 mod rooms;
 mod scene_page;
 mod site;
-#[cfg(test)]
-mod tests;
-pub mod verified;
-mod wide_curves;
-mod wide_views;
-
-pub use plan::{LeaderboardPlan, Submissions};
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Progress, Report};
-use minijinja::context;
-use minijinja::value::Serde;
 
 use self::board::Board;
+pub use self::entries::{LeaderboardPlan, Submissions};
 use self::file::LEADERBOARD_PATH;
-use self::site::{PAGES, PERTURBED, Page, Site, SiteWriter, WIDE_VIEWS};
+use self::site::{PAGES, PERTURBED, Site, SiteWriter, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
@@ -62,15 +40,15 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     check_place(out, force)?;
     progress(Report::step("ranking", 0, 1));
     let ranking = rank(plan.results, plan.protocol, plan.partial)?;
-    let ceiling = plan.ceiling.map(|result| ceiling::of(result, &ranking)).transpose()?;
+    let ceiling = plan.ceiling.map(|result| board::ceiling(result, &ranking)).transpose()?;
     let work = WorkFolder::start(out)?;
-    let named = named_submission::named(plan, &ranking)?;
+    let named = pictures::named(plan, &ranking)?;
     let pictures = pictures::gather(plan, &named, &ranking, &work.path().join("pictures"), progress)?;
     let rooms = rooms::write(plan, &named, &ranking, &work.path().join("rooms"), progress)?;
     let board = Board::new(plan, ranking, ceiling, pictures, rooms);
     let site = SiteWriter::new(work.path(), site(&board));
     site.assets()?;
-    downloads::write(&board, plan.protocol, &site)?;
+    board_page::write_downloads(&board, plan.protocol, &site)?;
     board_page::write(&board, &site)?;
     let pages = board.heads.len() + board.ranking().scenes.len();
     for at in 0..board.heads.len() {
@@ -82,11 +60,10 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
         scene_page::write(&board, at, &site)?;
     }
     scene_page::write_list(&board, &site)?;
-    room_page::write(&board, &site)?;
-    wide_views::write(&board, &site)?;
-    perturbed::write(&board, &site)?;
-    protocol_page::write(&board, &site)?;
-    write_constant_pages(plan, &site)?;
+    scene_page::write_rooms(&board, &site)?;
+    curves::write_wide_views(&board, &site)?;
+    curves::write_perturbed(&board, &site)?;
+    reference_pages::write(&board, plan.errata, &site)?;
     Ok(work.finish()?)
 }
 
@@ -113,28 +90,194 @@ fn site(board: &Board<'_>) -> Site {
         least_houses: ranking.rules.least_houses,
         pages: PAGES
             .into_iter()
-            .chain(wide_views::has_any(board).then_some(WIDE_VIEWS))
-            .chain(perturbed::has_any(board).then_some(PERTURBED))
+            .chain(curves::has_wide_views(board).then_some(WIDE_VIEWS))
+            .chain(curves::has_perturbed(board).then_some(PERTURBED))
             .collect(),
     }
 }
 
-/// Writes the pages that do not depend on the results.
-fn write_constant_pages(plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
-    let paper = paper::page();
-    site.page(&Page {
-        file: "paper.html",
-        template: "paper.j2",
-        title: "The paper's numbers",
-        scripts: &["sort.js"],
-        values: context! { paper => Serde(&paper) },
-    })?;
-    let errata = plan.errata.map_or(&[][..], |errata| &errata.entries);
-    site.page(&Page {
-        file: "errata.html",
-        template: "errata.j2",
-        title: "Errata",
-        scripts: &[],
-        values: context! { errata => Serde(errata) },
-    })
+// OLD PATHS, removed after the merge. They are paths below this module, so that lib.rs cannot hold them.
+#[doc(hidden)]
+pub mod errata {
+    pub use super::entries::ErrataFile;
+}
+#[doc(hidden)]
+pub mod results_folder {
+    pub use super::entries::ResultsFolder;
+}
+#[doc(hidden)]
+pub mod verified {
+    pub use super::entries::{Verified, sidecar};
+}
+
+#[cfg(test)]
+mod tests {
+    //! A small site of invented results; tests in a browser are in `tests/site`.
+
+    use mateval_eval::result::{ResultFile, TracerCheck};
+    use mateval_image::{Picture, png_io};
+    use mateval_scene::json;
+    use mateval_scene::manifest::sha256_of_file;
+    use mateval_scene::submission::Cost;
+
+    use super::entries::{Verified, verification_of};
+    use super::file::LeaderboardFile;
+    use super::*;
+    use crate::ranking::tests::{result, scores};
+
+    fn three() -> [ResultFile; 3] {
+        let mut results =
+            [("good", 30.0), ("<b>bold</b>", 25.0), ("bad", 20.0)].map(|(name, psnr)| result(name, &scores(psnr, 0.1)));
+        results[0].submission.url = Some("https://example.org/?a=1&b=2".to_owned());
+        results[1].submission.url = Some("javascript:alert(1)".to_owned());
+        results[2].submission.cost = Some(Cost { seconds_a_scene: 12.34, hardware: "a laptop".to_owned() });
+        results
+    }
+
+    fn plan(results: &[ResultFile]) -> LeaderboardPlan<'_> {
+        LeaderboardPlan {
+            results,
+            ceiling: None,
+            verified: vec![Verified::Confirmed, Verified::No, Verified::Stale],
+            protocol: "mateval-3",
+            partial: false,
+            errata: None,
+            pictures: None,
+            submissions: None,
+            tool: "mateval".to_owned(),
+        }
+    }
+
+    fn quiet(_: Report<'_>) {}
+
+    #[test]
+    fn a_site_has_all_its_pages() {
+        let folder = tempfile::tempdir().unwrap();
+        let (set, out) = (folder.path().join("set"), folder.path().join("site"));
+        let results = three();
+        let view = mateval_scene::ViewId::new("input").unwrap();
+        for (method, kind) in
+            [("good", "albedo"), ("good", "albedo-error"), (pictures::TRUTH, "albedo"), ("no id", "x")]
+        {
+            let path = pictures::place(&set, method, &results[0].dataset.scenes[0], &view, kind);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            png_io::write_rgb_bytes(&path, &Picture::filled(8, 6, [90; 3])).unwrap();
+        }
+        write(&LeaderboardPlan { pictures: Some(&set), ..plan(&results) }, &out, false, &quiet).unwrap();
+        let text = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+        let index = text("index.html");
+        assert!(index.contains("&lt;b&gt;bold&lt;&#x2f;b&gt;") && !index.contains("<b>bold"), "{index}");
+        assert_eq!((index.matches("> verified</span>").count(), index.matches("12.3<small>").count()), (1, 1));
+        assert!(text("methods/good.html").contains("href=\"https:&#x2f;&#x2f;example.org&#x2f;?a=1&amp;b=2\""));
+        assert!(!text("methods/b-bold-b.html").contains("javascript:"));
+        let scene = text("scenes/s00.html");
+        assert!(
+            scene.contains("data-kinds=\"albedo albedo-error\"") && scene.contains("width=\"8\" height=\"6\""),
+            "{scene}"
+        );
+        // Every page with pictures says once what black is; the twin has no pictures.
+        for (file, legends) in [
+            ("index.html", 1),
+            ("methods/good.html", 1),
+            ("scenes.html", 1),
+            ("scenes/s00.html", 1),
+            ("scenes/s01.html", 0),
+        ] {
+            assert_eq!(text(file).matches("Black areas of the pictures").count(), legends, "{file}");
+        }
+        assert!(text("scenes/s01.html").contains("No pictures were given"));
+        // Without a dataset there are no rooms, and the page says why.
+        assert!(scene.contains("There is no 3D view") && !out.join("rooms").exists());
+        assert!(text("protocol.html").contains(&results[0].protocols["mateval-3"].fingerprint));
+        assert!(text("errata.html").contains("None are known"));
+        assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));
+        assert!(out.join("pictures/good/s00/input/albedo-error.png").is_file() && !out.join("pictures/no id").exists());
+        let file: LeaderboardFile = json::read(&out.join(LEADERBOARD_PATH)).unwrap();
+        assert_eq!((file.methods.len(), file.ranking.keys.len()), (3, 2));
+        let lines = text("downloads/leaderboard.csv").lines().count();
+        assert_eq!((lines, text("methods/bad.csv").lines().count()), (1 + 3 * 2, 1 + 12));
+    }
+
+    #[test]
+    fn the_ceiling_is_shown_and_not_ranked() {
+        let folder = tempfile::tempdir().unwrap();
+        let (results, ceiling) = (three(), result("gt", &scores(48.0, 0.0)));
+        let out = folder.path().join("site");
+        write(&LeaderboardPlan { ceiling: Some(&ceiling), ..plan(&results) }, &out, false, &quiet).unwrap();
+        let index = std::fs::read_to_string(out.join("index.html")).unwrap();
+        assert!(index.contains("<tfoot>") && index.contains("ceiling: the truth itself"), "{index}");
+        let file: LeaderboardFile = json::read(&out.join(LEADERBOARD_PATH)).unwrap();
+        assert_eq!(
+            (file.ranking.methods.len(), file.ceiling.map(|ceiling| ceiling.method)),
+            (3, Some("gt".to_owned()))
+        );
+        assert!(std::fs::read_to_string(out.join("downloads/tables.csv")).unwrap().contains("\"gt (ceiling)\""));
+        let mut other = ceiling;
+        other.dataset.scenes.pop();
+        let plan = LeaderboardPlan { ceiling: Some(&other), ..plan(&results) };
+        let error = write(&plan, &out, true, &quiet).unwrap_err().to_string();
+        assert!(error.contains("'good' and 'gt' were scored on different scenes"), "{error}");
+    }
+
+    /// The check that speaks most against the tracer is stated, and its absence.
+    #[test]
+    fn a_board_states_whether_the_tracer_was_checked() {
+        let folder = tempfile::tempdir().unwrap();
+        let line = |checks: [Option<(usize, usize)>; 3]| {
+            let mut results = three();
+            for (result, check) in results.iter_mut().zip(checks) {
+                result.tracer_check = check.map(|(informative, agree)| TracerCheck { informative, agree });
+            }
+            let out = folder.path().join("site");
+            write(&plan(&results), &out, true, &quiet).unwrap();
+            let index = std::fs::read_to_string(out.join("index.html")).unwrap();
+            index.lines().find(|line| line.contains("racer")).unwrap().to_owned()
+        };
+        let good = "<p class=\"small\">Tracer and Blender agree in 65 of 65 informative checks.</p>";
+        let bad = "<p class=\"notice\">Tracer and Blender agree in 62 of 65 informative checks.</p>";
+        let absent = "<p class=\"notice\">The tracer was not compared with Blender on this dataset.</p>";
+        assert_eq!(line([None, Some((65, 65)), Some((65, 65))]), good);
+        assert_eq!(line([Some((65, 62)), Some((65, 65)), None]), bad);
+        assert_eq!(line([None; 3]), absent);
+    }
+
+    #[test]
+    fn only_a_leaderboard_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = three();
+        let out = folder.path().join("site");
+        write(&plan(&results), &out, false, &quiet).unwrap();
+        let error = write(&plan(&results), &out, false, &quiet).unwrap_err().to_string();
+        assert!(error.contains("add --force"), "{error}");
+        write(&plan(&results[..2]), &out, true, &quiet).unwrap();
+        assert!(!out.join("methods/bad.html").exists());
+        let other = folder.path().join("other");
+        std::fs::create_dir(&other).unwrap();
+        std::fs::write(other.join("mine.txt"), "mine").unwrap();
+        let error = write(&plan(&results), &other, true, &quiet).unwrap_err().to_string();
+        assert!(error.contains("is not a leaderboard") && other.join("mine.txt").exists(), "{error}");
+    }
+
+    #[test]
+    fn verifications_hold_for_the_same_bytes_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        let result = result("a", &scores(30.0, 0.0));
+        json::write(&path, &result).unwrap();
+        assert_eq!(verification_of(&path, &result).unwrap(), Verified::No);
+        let write_sidecar = |format: &str, result_sha256: &str, confirmed: bool| {
+            let file = serde_json::json!({
+                "format": format, "tool": "mateval", "result_sha256": result_sha256, "confirmed": confirmed, "differences": 0, "findings": [],
+                "submission_sha256": result.submission.sha256,
+                "dataset_manifest_sha256": result.dataset.manifest_sha256,
+            });
+            json::write(&entries::sidecar(&path), &file).unwrap();
+            verification_of(&path, &result)
+        };
+        let (format, sha256) = ("mateval-verification/1", sha256_of_file(&path).unwrap());
+        assert_eq!(write_sidecar(format, &sha256, true).unwrap(), Verified::Confirmed);
+        assert_eq!(write_sidecar(format, &sha256, false).unwrap(), Verified::Refuted);
+        assert_eq!(write_sidecar(format, &"0".repeat(64), true).unwrap(), Verified::Stale);
+        assert!(write_sidecar("mateval-verification/9", &sha256, true).is_err());
+    }
 }

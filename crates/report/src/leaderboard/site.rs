@@ -54,7 +54,6 @@ pub(super) struct Site {
     pub(super) pages: Vec<PageLink>,
 }
 
-/// An entry of the menu.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct PageLink {
     file: &'static str,
@@ -76,7 +75,6 @@ pub(super) const WIDE_VIEWS: PageLink = PageLink { file: "wide_views.html", titl
 /// The entry of a site with submissions that were made from perturbed geometry.
 pub(super) const PERTURBED: PageLink = PageLink { file: "perturbed.html", title: "Imperfect geometry" };
 
-/// One page.
 pub(super) struct Page<'a> {
     /// Its file in the site, at most one folder deep.
     pub(super) file: &'a str,

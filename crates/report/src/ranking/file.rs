@@ -6,9 +6,11 @@ use mateval_scene::SceneId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::holm::LEVEL;
 use mateval_eval::metric::Better;
 use mateval_eval::result_key::ResultKey;
+
+/// Differences with a corrected p-value below this are significant.
+pub(super) const LEVEL: f64 = 0.05;
 
 /// Methods ranked under one protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -150,7 +152,6 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Whether the difference is significant.
     pub fn is_significant(&self) -> bool {
         self.p_holm.is_some_and(|p| p < LEVEL)
     }

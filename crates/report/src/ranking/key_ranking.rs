@@ -1,12 +1,10 @@
-//! The ranking by one score, which compares each pair of methods on the scenes that both have.
+//! The ranking by one score, which compares each pair of methods on the scenes that both have. Ranks are ranges: methods
+//! whose difference may be chance share ranks.
 
-use super::bootstrap::{Duel, duels, intervals};
-use super::clusters::Clusters;
-use super::draws::DrawTable;
-use super::file::{Interval, IntervalKind, KeyRanking, Pair, RankingRules, Standing};
-use super::holm::corrected;
-use super::rank_ranges::rank_ranges;
 use mateval_eval::metric::Better;
+
+use super::bootstrap::{Clusters, DrawTable, Duel, duels, intervals};
+use super::file::{Interval, IntervalKind, KeyRanking, Pair, RankRange, RankingRules, Standing};
 
 /// Values of one key.
 pub(super) struct KeyValues<'a> {
@@ -175,5 +173,50 @@ impl Meeting {
             p: self.duel.map(|duel| duel.p),
             p_holm: self.duel.map(|_| p_holm),
         }
+    }
+}
+
+/// p-values corrected for their number (Holm 1979): below `level` where Holm's procedure rejects equality.
+fn corrected(p_values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
+    let mut corrected = vec![0.0; p_values.len()];
+    let mut largest: f64 = 0.0;
+    for (done, at) in order.into_iter().enumerate() {
+        largest = largest.max(p_values[at] * (p_values.len() - done) as f64);
+        corrected[at] = largest.min(1.0);
+    }
+    corrected
+}
+
+/// The range of ranks of each of `methods` methods: a method ranks below all that are significantly better and above all
+/// that are significantly worse. `beaten` holds pairs of a winner and a loser, as places in the list of methods.
+fn rank_ranges(methods: usize, beaten: &[(usize, usize)]) -> Vec<RankRange> {
+    let mut ranks = vec![RankRange { best: 1, worst: methods }; methods];
+    for (winner, loser) in beaten {
+        ranks[*loser].best += 1;
+        ranks[*winner].worst -= 1;
+    }
+    ranks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")` gives them.
+    #[test]
+    fn holm_as_r_does() {
+        let corrected = corrected(&[0.01, 0.04, 0.03, 0.005]);
+        for (found, expected) in corrected.iter().zip([0.03, 0.06, 0.06, 0.02]) {
+            assert!((found - expected).abs() < 1e-15, "{corrected:?}");
+        }
+    }
+
+    #[test]
+    fn ranks_by_hand() {
+        let range = |best, worst| RankRange { best, worst };
+        assert_eq!(rank_ranges(3, &[]), [range(1, 3); 3]);
+        assert_eq!(rank_ranges(3, &[(0, 2), (1, 2)]), [range(1, 2), range(1, 2), range(3, 3)]);
     }
 }

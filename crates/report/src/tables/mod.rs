@@ -1,27 +1,22 @@
 //! Tables of several results: the paper's II to V, then ours in the same layout, for the whole dataset or by scene or
 //! category.
 //!
-//! `layouts` lists the tables and their columns, `rows` collects their numbers, `table` fills them and marks the best,
-//! and each format has a file that writes them.
+//! `layouts` lists the tables and their columns, `table` collects their numbers, fills them and marks the best, and
+//! `formats` writes them.
 
-pub(crate) mod csv;
-mod grouping;
-mod latex;
+mod formats;
 mod layouts;
-mod markdown;
-pub(crate) mod pooled;
-mod rows;
 mod table;
 #[cfg(test)]
 mod tests;
-mod text;
-pub(crate) mod value;
 
-pub use grouping::Grouping;
-pub use text::wrapped;
+pub(crate) use formats::quoted;
+pub use formats::wrapped;
+pub use layouts::Grouping;
+pub(crate) use layouts::{CellKey, Value};
+pub(crate) use table::pooled;
 
-use crate::error::ReportError;
-use crate::mismatch::Mismatch;
+use crate::error::{Mismatch, ReportError};
 use mateval_eval::result::ResultFile;
 
 /// How a table is written.
@@ -39,7 +34,8 @@ pub enum TableFormat {
 
 /// Puts the results side by side under one protocol. Results with different fingerprints or scenes are refused. A
 /// column without values is left out. A value is shown as missing if another result has it for that scene or category,
-/// and as a dash if none has or the submission does not predict that map. The result of the truth itself, the `ceiling`, has the last row of each group and no mark.
+/// and as a dash if none has or the submission does not predict that map. The result of the truth itself, the `ceiling`,
+/// has the last row of each group and no mark.
 pub fn tables(
     results: &[ResultFile],
     ceiling: Option<&ResultFile>,
@@ -74,16 +70,16 @@ fn filled(
     format: TableFormat,
 ) -> Result<String, ReportError> {
     check_comparable(results, ceiling, protocol)?;
-    let groups = rows::groups(results, ceiling, protocol, grouping);
+    let groups = table::groups(results, ceiling, protocol, grouping);
     let tables = layouts.iter().filter_map(|layout| table::Table::fill(layout, grouping, &groups));
     // The other formats end each table with a blank line.
     let between = if matches!(format, TableFormat::Text { .. }) { "\n" } else { "" };
     let texts: Vec<String> = tables
         .map(|table| match format {
-            TableFormat::Markdown => markdown::text(&table),
-            TableFormat::Latex => latex::text(&table),
-            TableFormat::Csv => csv::text(&table),
-            TableFormat::Text { bold } => text::text(&table, bold),
+            TableFormat::Markdown => formats::markdown(&table),
+            TableFormat::Latex => formats::latex(&table),
+            TableFormat::Csv => formats::csv(&table),
+            TableFormat::Text { bold } => formats::aligned(&table, bold),
         })
         .collect();
     if texts.is_empty() {

@@ -1,11 +1,169 @@
-//! A table before it is written: heads, cells, and which of them are best.
+//! A table before it is written: the numbers of each method, in groups; heads, cells, and which of them are best.
 
-use mateval_eval::metric::Better;
+use std::collections::BTreeMap;
 
-use super::grouping::Grouping;
-use super::layouts::Layout;
-use super::rows::{Group, Row};
-use super::value::{CellKey, Value};
+use mateval_eval::metric::{Better, Metric};
+use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
+use mateval_eval::result_key::{PictureKind, PictureName, ResultKey, Views};
+use mateval_metrics::Psnr;
+use mateval_scene::{SceneId, SourceKind};
+
+use super::layouts::{CellKey, Grouping, Layout, Quantity, Value};
+
+/// One method's numbers.
+pub(super) struct Row {
+    method: String,
+    values: BTreeMap<CellKey, Value>,
+    /// The stems of maps that its submission never contains, which have no values.
+    not_predicted: Vec<String>,
+}
+
+impl Row {
+    /// Whether the row could have this number: its submission contains the map that the number is about.
+    fn predicts(&self, key: &CellKey) -> bool {
+        key.picture.kind.map().is_none_or(|map| !self.not_predicted.iter().any(|stem| stem == map.stem()))
+    }
+}
+
+/// Rows that are compared with each other.
+pub(super) struct Group {
+    /// The scene, category or kind of source; empty for the whole dataset.
+    name: String,
+    rows: Vec<Row>,
+    /// The truth's own numbers, which no method is expected to exceed.
+    ceiling: Option<Row>,
+}
+
+/// The groups, with methods in the order of the results. Scenes are in the dataset's order, categories by name with
+/// `other` last.
+pub(super) fn groups(
+    results: &[ResultFile],
+    ceiling: Option<&ResultFile>,
+    protocol: &str,
+    grouping: Grouping,
+) -> Vec<Group> {
+    let all = results.iter().chain(ceiling);
+    let scored: Vec<(&ResultFile, &ProtocolResult)> =
+        all.filter_map(|result| Some((result, result.protocols.get(protocol)?))).collect();
+    let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<CellKey, Value>| {
+        let row = |(at, (result, scores)): (usize, &(&ResultFile, &ProtocolResult))| Row {
+            method: result.shown_method(),
+            values: values(at, scores),
+            not_predicted: result.not_predicted.clone(),
+        };
+        let mut rows: Vec<Row> = scored.iter().enumerate().map(row).collect();
+        let ceiling = ceiling.and_then(|_| rows.pop());
+        Group { name: name.to_owned(), rows, ceiling }
+    };
+    match grouping {
+        // The paper's tables hold rooms of 3D-FRONT alone.
+        Grouping::Dataset if protocol == "paper" && sources(results).len() > 1 => sources(results)
+            .into_iter()
+            .map(|(kind, scenes)| group(source_title(kind), &|_, scores| of_scenes(scores, &scenes)))
+            .collect(),
+        Grouping::Dataset => vec![group("", &|_, scores| of_dataset(scores))],
+        Grouping::Scene => {
+            let scenes = results.first().map_or(&[][..], |result| &result.dataset.scenes);
+            scenes.iter().map(|scene| group(scene.as_str(), &|_, scores| of_scene(scores, scene))).collect()
+        }
+        Grouping::Category | Grouping::SuperCategory => {
+            let by_method: Vec<_> = scored.iter().map(|(_, scores)| pooled(&scores.instances, grouping)).collect();
+            let mut names: Vec<&String> = by_method.iter().flat_map(BTreeMap::keys).collect();
+            names.sort_by_key(|name| (*name == OTHER, *name));
+            names.dedup();
+            let of = |at: usize, name: &String| by_method[at].get(name).cloned().unwrap_or_default();
+            names.into_iter().map(|name| group(name, &|at, _| of(at, name))).collect()
+        }
+    }
+}
+
+/// The scenes of each kind of source.
+fn sources(results: &[ResultFile]) -> BTreeMap<SourceKind, Vec<SceneId>> {
+    let mut kinds: BTreeMap<SourceKind, Vec<SceneId>> = BTreeMap::new();
+    for (scene, kind) in results.iter().flat_map(|result| &result.dataset.sources) {
+        let scenes = kinds.entry(*kind).or_default();
+        if !scenes.contains(scene) {
+            scenes.push(scene.clone());
+        }
+    }
+    kinds
+}
+
+fn source_title(kind: SourceKind) -> &'static str {
+    match kind {
+        SourceKind::Front3d => "3D-FRONT",
+        SourceKind::Bitterli => "Bitterli",
+        SourceKind::Gltf => "glTF",
+        SourceKind::Blend => "Blender",
+    }
+}
+
+/// Means over some of the scenes; the noise of different scenes is independent.
+fn of_scenes(scores: &ProtocolResult, scenes: &[SceneId]) -> BTreeMap<CellKey, Value> {
+    let mut all: BTreeMap<CellKey, Vec<Value>> = BTreeMap::new();
+    for (key, value) in scenes.iter().flat_map(|scene| of_scene(scores, scene)) {
+        all.entry(key).or_default().push(value);
+    }
+    let mean = |values: Vec<Value>| {
+        let count = values.len() as f64;
+        let squares: Option<f64> = values.iter().map(|value| value.standard_error.map(|error| error * error)).sum();
+        Value {
+            value: values.iter().map(|value| value.value).sum::<f64>() / count,
+            standard_error: squares.map(|squares| squares.sqrt() / count),
+        }
+    };
+    all.into_iter().map(|(key, values)| (key, mean(values))).collect()
+}
+
+fn of_dataset(scores: &ProtocolResult) -> BTreeMap<CellKey, Value> {
+    let value = |(key, value): (&ResultKey, &f64)| {
+        let standard_error = scores.summary_noise.get(key).copied();
+        (CellKey::from(*key), Value { value: *value, standard_error })
+    };
+    scores.summary.iter().map(value).collect()
+}
+
+fn of_scene(scores: &ProtocolResult, scene: &SceneId) -> BTreeMap<CellKey, Value> {
+    let noise = scores.noise.get(scene);
+    let value = |(key, value): (&ResultKey, &f64)| {
+        let standard_error = noise.and_then(|noise| noise.get(key)).copied();
+        (CellKey::from(*key), Value { value: *value, standard_error })
+    };
+    scores.scenes.get(scene).into_iter().flatten().map(value).collect()
+}
+
+/// The group of instances without a category.
+const OTHER: &str = "other";
+
+/// By category: the number of pixels, the mean squared error over all of them, and its PSNR.
+///
+/// Every pixel has the same weight, regardless of scene, view and instance. Unlike in the other tables, PSNR is that of
+/// a mean. It is missing if the error is not above 0 after noise removal.
+pub(crate) fn pooled(instances: &[InstancePixelErrors], by: Grouping) -> BTreeMap<String, BTreeMap<CellKey, Value>> {
+    let mut sums: BTreeMap<(String, PictureKind, Views), (f64, usize)> = BTreeMap::new();
+    for errors in instances.iter().filter(|errors| errors.pixels > 0) {
+        let category = if by == Grouping::SuperCategory { &errors.super_category } else { &errors.category };
+        let category = category.clone().unwrap_or_else(|| OTHER.to_owned());
+        let sum = sums.entry((category, errors.picture, errors.views)).or_default();
+        sum.0 += errors.mse * errors.pixels as f64;
+        sum.1 += errors.pixels;
+    }
+    let mut pooled: BTreeMap<String, BTreeMap<CellKey, Value>> = BTreeMap::new();
+    for ((category, kind, views), (sum, pixels)) in sums {
+        let values = pooled.entry(category).or_default();
+        let mut add = |quantity: Quantity, value: f64| {
+            let key = CellKey { picture: PictureName::whole(kind), views, quantity };
+            values.insert(key, Value { value, standard_error: None });
+        };
+        let mse = sum / pixels as f64;
+        add(Quantity::Pixels, pixels as f64);
+        add(Quantity::Score(Metric::Mse), mse);
+        if let Some(psnr) = Psnr::from_mse(mse).ok().filter(|psnr| !(kind.is_light() && psnr.exact)) {
+            add(Quantity::Score(Metric::Psnr), psnr.db);
+        }
+    }
+    pooled
+}
 
 /// A table without empty columns.
 pub(super) struct Table<'a> {
@@ -18,7 +176,6 @@ pub(super) struct Table<'a> {
     pub(super) groups: Vec<TableGroup<'a>>,
 }
 
-/// A column.
 pub(super) struct Column {
     pub(super) block: &'static str,
     /// Whether any of its values has a standard error.

@@ -1,4 +1,4 @@
-//! `.tar.gz`: what the `tar` crate reads, in gzip, under the byte budget of [`super::limits`].
+//! `.tar.gz`: what the `tar` crate reads, in gzip, under the byte budget of [`super::unpacked`].
 //!
 //! The crate is used in raw mode, which yields the headers of GNU long names and of pax attributes as entries of their
 //! own. It then reads nothing unboundedly into memory and expands no sparse file. Every byte that it asks for, also one
@@ -13,9 +13,7 @@ use flate2::bufread::MultiGzDecoder;
 use mateval_scene::findings::shortened;
 use tar::{Archive, Entry, EntryType};
 
-use super::entry::{EntryKind, Writer};
-use super::fault::Fault;
-use super::limits::Budget;
+use super::unpacked::{Budget, EntryKind, Fault, Writer};
 use crate::map_file::MAX_MAP_BYTES;
 
 /// Longest name or list of attributes that precedes its entry, in bytes. It is held in memory.

@@ -6,9 +6,7 @@ use std::path::Path;
 
 use flate2::bufread::DeflateDecoder;
 
-use super::entry::{EntryKind, Writer};
-use super::fault::Fault;
-use super::limits::{Budget, MAX_ENTRIES};
+use super::unpacked::{Budget, EntryKind, Fault, MAX_ENTRIES, Writer};
 
 /// Largest central directory, in bytes. It is held in memory.
 const MAX_DIRECTORY: u64 = 64 << 20;

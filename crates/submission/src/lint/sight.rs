@@ -1,9 +1,13 @@
-//! Which place of which atlas each pixel of the input picture shows, and in what colour. Read from public files alone.
+//! What the input picture shows of a submission's maps: which place of which atlas each pixel sees, the values that the
+//! maps hold there, also after the turns of common mistakes, and how these correlate with the picture.
+//!
+//! Pictures and geometry are read from the dataset's public files alone.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec2;
-use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
+use mateval_image::{LinearRgb, Mask, Picture, Texture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::open::Dataset;
@@ -14,7 +18,7 @@ use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
 use crate::error::{SceneFault, SubmissionError};
-use crate::texel_map::TexelMap;
+use crate::texel_map::{SurfaceTexel, TexelMap};
 
 /// Most pixels of the picture that are used.
 const MOST_PIXELS: usize = 100_000;
@@ -150,10 +154,190 @@ fn coarse_texels(world: &World, instance: usize, camera: &Camera) -> Vec<CoarseT
     let map = TexelMap::new(world, SurfaceIndex(instance), mesh, COARSE, camera);
     let along = |at: usize| (at as f32 + 0.5) / COARSE as f32;
     let texels = (0..COARSE).flat_map(|y| map.row(y).map(move |texel| (y, texel)));
-    let coarse = |(y, texel): (usize, crate::texel_map::SurfaceTexel)| CoarseTexel {
+    let coarse = |(y, texel): (usize, SurfaceTexel)| CoarseTexel {
         uv: texel.off_centre.unwrap_or([along(texel.column), 1.0 - along(y)]),
         area_m2: texel.area_m2,
         observed: texel.observed,
     };
     texels.map(coarse).collect()
+}
+
+/// How an atlas may have been turned when it was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    None,
+    /// Top and bottom exchanged: v counted from the other end.
+    Vertical,
+    /// Left and right exchanged.
+    Horizontal,
+    /// Both: half a turn.
+    Half,
+    /// Rows and columns exchanged.
+    Transposed,
+}
+
+impl Turn {
+    /// All of them, [`Turn::None`] first.
+    pub(super) const ALL: [Self; 5] = [Self::None, Self::Vertical, Self::Horizontal, Self::Half, Self::Transposed];
+
+    /// Where in the file the value lies that belongs at `uv`; v runs upwards.
+    fn place(self, [u, v]: [f32; 2]) -> [f32; 2] {
+        match self {
+            Self::None => [u, v],
+            Self::Vertical => [u, 1.0 - v],
+            Self::Horizontal => [1.0 - u, v],
+            Self::Half => [1.0 - u, 1.0 - v],
+            Self::Transposed => [1.0 - v, 1.0 - u],
+        }
+    }
+}
+
+/// A pixel of the picture with the base colour that the submission has there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    pub(super) instance: usize,
+    /// Its neighbourhood in the picture.
+    pub(super) tile: usize,
+    /// The picture's colour, linear.
+    pub(super) photo: Option<[f32; 3]>,
+    /// The base colour, linear, under each of [`Turn::ALL`].
+    pub(super) base_color: [[f32; 3]; 5],
+}
+
+impl Look {
+    /// The base colour as scoring reads it.
+    pub(super) fn own(&self) -> [f32; 3] {
+        self.base_color[0]
+    }
+}
+
+/// The base colour at each pixel that shows the instance.
+pub(super) fn looks(instance: usize, pixels: &[SeenPixel], base_color: &Texture) -> Vec<Look> {
+    let look = |pixel: &SeenPixel| Look {
+        instance,
+        tile: pixel.tile,
+        photo: pixel.photo,
+        base_color: Turn::ALL.map(|turn| mean(base_color, pixel, turn)),
+    };
+    pixels.iter().map(look).collect()
+}
+
+/// Roughness and metallic at a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScalarLook {
+    pub(super) roughness: f32,
+    pub(super) metallic: f32,
+}
+
+/// Both maps at each pixel that shows the instance; none where a map is missing.
+pub(super) fn scalar_looks(
+    pixels: &[SeenPixel],
+    roughness: Option<Texture>,
+    metallic: Option<Texture>,
+) -> Vec<ScalarLook> {
+    let (Some(roughness), Some(metallic)) = (roughness, metallic) else { return Vec::new() };
+    let look = |pixel: &SeenPixel| {
+        let [roughness, metallic] = [&roughness, &metallic].map(|map| mean(map, pixel, Turn::None)[0]);
+        ScalarLook { roughness, metallic }
+    };
+    pixels.iter().map(look).collect()
+}
+
+/// The mean of a map over a pixel.
+fn mean(texture: &Texture, pixel: &SeenPixel, turn: Turn) -> [f32; 3] {
+    let sum = pixel.uvs.iter().fold([0.0; 3], |sum: [f32; 3], uv| {
+        let value = texture.sample(turn.place(*uv));
+        std::array::from_fn(|c| sum[c] + value[c])
+    });
+    sum.map(|sum| sum / pixel.uvs.len() as f32)
+}
+
+/// Sums over pairs of numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Pairs {
+    count: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    yy: f64,
+    xy: f64,
+}
+
+impl Pairs {
+    pub(super) fn add(&mut self, x: f64, y: f64) {
+        self.count += 1.0;
+        self.x += x;
+        self.y += y;
+        self.xx += x * x;
+        self.yy += y * y;
+        self.xy += x * y;
+    }
+
+    /// The sums of all pairs after the mean of each pair's group has been subtracted.
+    pub(super) fn within<K: Ord>(pairs: impl IntoIterator<Item = (K, f64, f64)>) -> Self {
+        let mut groups: BTreeMap<K, Self> = BTreeMap::new();
+        pairs.into_iter().for_each(|(group, x, y)| groups.entry(group).or_default().add(x, y));
+        groups.values().fold(Self::default(), |sum, group| {
+            let [xx, yy, xy] = group.centred();
+            Self { count: sum.count + group.count, xx: sum.xx + xx, yy: sum.yy + yy, xy: sum.xy + xy, ..sum }
+        })
+    }
+
+    pub(super) fn count(&self) -> f64 {
+        self.count
+    }
+
+    /// The standard deviations of x and of y.
+    pub(super) fn deviations(&self) -> [f64; 2] {
+        let [xx, yy, _] = self.centred();
+        [xx, yy].map(|sum| (sum / self.count.max(1.0)).sqrt())
+    }
+
+    /// The correlation, -1 to 1; 0 where x or y is constant.
+    pub(super) fn correlation(&self) -> f64 {
+        let [xx, yy, xy] = self.centred();
+        if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+    }
+
+    /// Squares and products about the means, summed.
+    fn centred(&self) -> [f64; 3] {
+        let count = self.count.max(1.0);
+        let about = |sum: f64, a: f64, b: f64| sum - a * b / count;
+        let [xx, yy] = [about(self.xx, self.x, self.x), about(self.yy, self.y, self.y)].map(|sum| sum.max(0.0));
+        [xx, yy, about(self.xy, self.x, self.y)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_image::{Texels, Wrap};
+
+    use super::*;
+
+    /// Four different texels, turned when they were written: each turn finds the one that belongs at the upper left.
+    #[test]
+    fn turns_find_the_texel_that_was_moved() {
+        let written = |texels: [f32; 4]| Texture::new(2, 2, Texels::Grey(texels.into()), Wrap::Clamp).unwrap();
+        let upper_left = SeenPixel { uvs: [[0.25, 0.75]; 4], photo: None, tile: 0 };
+        let files = [[1.0, 2.0, 3.0, 4.0], [3.0, 4.0, 1.0, 2.0], [2.0, 1.0, 4.0, 3.0], [4.0, 3.0, 2.0, 1.0]];
+        for (turn, file) in Turn::ALL.into_iter().zip(files) {
+            assert_eq!(mean(&written(file), &upper_left, turn)[0], 1.0, "{turn:?}");
+        }
+        let upper_right = SeenPixel { uvs: [[0.75, 0.75]; 4], ..upper_left };
+        assert_eq!(mean(&written([1.0, 3.0, 2.0, 4.0]), &upper_right, Turn::Transposed)[0], 2.0);
+    }
+
+    #[test]
+    fn a_line_and_groups_on_lines() {
+        let mut line = Pairs::default();
+        (0..5).for_each(|x| line.add(f64::from(x), 3.0 - 2.0 * f64::from(x)));
+        assert!((line.correlation() + 1.0).abs() < 1e-12);
+        let [x, y] = line.deviations();
+        assert!((x - 2.0_f64.sqrt()).abs() < 1e-12 && (y - 2.0 * x).abs() < 1e-12);
+        // Two groups, each rising, the later far below: within them it rises, over all it falls.
+        let groups = (0..10).map(|k| (k / 5, f64::from(k), f64::from(k % 5) - 100.0 * f64::from(k / 5)));
+        let mut all = Pairs::default();
+        groups.clone().for_each(|(_, x, y)| all.add(x, y));
+        assert!(all.correlation() < -0.5 && (Pairs::within(groups).correlation() - 1.0).abs() < 1e-12);
+    }
 }

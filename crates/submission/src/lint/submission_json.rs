@@ -1,4 +1,5 @@
-//! `submission.json`: every fault with its JSON pointer.
+//! `submission.json`: every fault with its JSON pointer. And the rule for a method's name, which it states, and which
+//! tables and boards show.
 
 use std::path::Path;
 
@@ -8,12 +9,9 @@ use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FOR
 use mateval_scene::{Finding, Severity};
 use serde_json::{Map, Value};
 
-use super::finding::{error, warning};
-use super::names::nearest;
-use crate::file_fault::FileFault;
-use crate::map_folder::exists;
-use crate::method_name;
-use crate::submitted_file::SubmittedFile;
+use super::folder::nearest;
+use crate::error::{FileFault, error, finding, warning};
+use crate::files::{SubmittedFile, exists};
 
 /// Its keys, the kinds of value that each may have, and whether it must be given. They are those of [`SubmissionFile`].
 const KEYS: [(&str, &[&str], bool); 9] = [
@@ -27,6 +25,9 @@ const KEYS: [(&str, &[&str], bool); 9] = [
     ("geometry", &["an object", "null"], false),
     ("dataset_manifest_sha256", &["a string"], true),
 ];
+
+/// Longest name of a method, in characters.
+const LONGEST_METHOD_NAME: usize = 100;
 
 /// The method's name, if it has one, and every fault. `manifest_sha256` is that of the dataset to compare with.
 pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<Finding>) {
@@ -131,7 +132,7 @@ fn check_object(object: Map<String, Value>, manifest_sha256: &str) -> Vec<Findin
         let Some(text) = value.as_str() else { continue };
         let found = match key.as_str() {
             "format" => check_format(text),
-            "method" => method_name::check(text, Severity::Warning, SUBMISSION),
+            "method" => check_method_name(text, Severity::Warning, SUBMISSION),
             "dataset_manifest_sha256" => check_hash(text, manifest_sha256),
             _ => None,
         };
@@ -183,14 +184,41 @@ fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
     (text != manifest_sha256).then(|| warning("other_dataset", SUBMISSION, message(), action))
 }
 
+/// What is wrong with the name of a method, as a finding about `file` without a place; none for a name that tables can
+/// show.
+pub fn check_method_name(name: &str, severity: Severity, file: &str) -> Option<Finding> {
+    let found = |code: &str, message: String, action: String| Some(finding(severity, code, file, message, action));
+    if name.chars().all(|c| c.is_whitespace() || is_unprintable(c)) {
+        let message = "the method has no name".to_owned();
+        return found("no_method_name", message, "write the name that tables should show".to_owned());
+    }
+    let (length, unprintable) = (name.chars().count(), name.chars().any(is_unprintable));
+    if length <= LONGEST_METHOD_NAME && !unprintable {
+        return None;
+    }
+    let unprintable = if unprintable { ", some of them unprintable" } else { "" };
+    let message = format!("the method's name has {length} characters{unprintable}");
+    found("bad_method_name", message, format!("use at most {LONGEST_METHOD_NAME} printable characters"))
+}
+
+/// Whether the character shows nothing by itself: two names that differ only in such characters look the same, and those
+/// that set the direction of writing reorder the text around the name.
+fn is_unprintable(c: char) -> bool {
+    let is_ignorable = matches!(c,
+        '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}' | '\u{180b}'..='\u{180f}'
+        | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}'
+        | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff0}'..='\u{fffb}' | '\u{1d173}'..='\u{1d17a}'
+        | '\u{e0000}'..='\u{e0fff}');
+    c.is_control() || is_ignorable
+}
+
 #[cfg(test)]
 mod tests {
+    use super::*;
     use mateval_scene::perturbation::{Perturbation, PerturbationKind};
     use mateval_scene::stored_encoding::StoredEncoding;
     use mateval_scene::submission::Cost;
     use serde_json::json;
-
-    use super::*;
 
     /// The codes of what is found in a folder with this `submission.json`.
     fn codes(file: &Value) -> Vec<String> {
@@ -237,6 +265,24 @@ mod tests {
             let mut changed = whole.clone();
             changed[key] = value;
             assert_eq!(codes(&changed), [expected], "{changed}");
+        }
+    }
+
+    fn code_of_name(name: &str) -> Option<String> {
+        check_method_name(name, Severity::Warning, "submission.json").map(|finding| finding.code)
+    }
+
+    #[test]
+    fn names_that_tables_cannot_show_are_found() {
+        for name in ["", " \t", "\u{200b}", "\u{202e}\u{2066}", "\0"] {
+            assert_eq!(code_of_name(name).as_deref(), Some("no_method_name"), "{name:?}");
+        }
+        let long = "x".repeat(LONGEST_METHOD_NAME + 1);
+        for name in ["a\nb", "a\0", "safe\u{202e}gpj", "a\u{2067}b", "a\u{200b}b", "a\u{2028}b", &long] {
+            assert_eq!(code_of_name(name).as_deref(), Some("bad_method_name"), "{name:?}");
+        }
+        for name in ["MatEval <b>", "b_2 (ours)", "材料 é", &"x".repeat(LONGEST_METHOD_NAME)] {
+            assert_eq!(code_of_name(name), None, "{name:?}");
         }
     }
 }

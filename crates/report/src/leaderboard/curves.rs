@@ -1,0 +1,346 @@
+//! Pages of curves, a line for each method and the same numbers as a table: how scores fall in views from other places
+//! than the input view's, and the more the geometry that a method is given differs from the true one.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mateval_eval::metric::Metric;
+use mateval_eval::result::PictureValues;
+use mateval_eval::result_key::PictureName;
+use mateval_scene::dataset::WideView;
+use mateval_scene::layout::INPUT;
+use mateval_scene::perturbation::PerturbationKind;
+use mateval_scene::{SceneId, ViewId};
+use minijinja::context;
+use minijinja::value::Serde;
+use serde::Serialize;
+
+use super::board::Board;
+use super::columns::{Column, headlines};
+use super::entries::is_in_curves;
+use super::site::{Page, SiteWriter};
+use crate::error::ReportError;
+
+/// Classes of the share of pixels that the input view does not show.
+const SHARES: u32 = 5;
+/// Size of a chart, and the margins around its lines, in its own units.
+const SIZE: [f64; 2] = [320.0, 180.0];
+const MARGIN: [f64; 2] = [28.0, 16.0];
+
+pub(super) fn has_wide_views(board: &Board<'_>) -> bool {
+    board.results.iter().any(|result| !result.dataset.wide_views.is_empty())
+}
+
+/// Writes the page, if any scene has wide views.
+pub(super) fn write_wide_views(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    if !has_wide_views(board) {
+        return Ok(());
+    }
+    let methods: Vec<Method<'_>> = board
+        .best_first()
+        .into_iter()
+        .map(|at| Method {
+            name: &board.heads[at].name,
+            pictures: &board.scores[at].pictures,
+            wide_views: &board.results[at].dataset.wide_views,
+        })
+        .collect();
+    let scenes = methods.first().map(|method| method.wide_views);
+    let sections = [
+        ("By distance from the input camera", Axis::Distance),
+        ("By the share of the picture that the input view does not show", Axis::UnseenShare),
+    ]
+    .map(|(title, axis)| Section { title: title.to_owned(), charts: charts(&methods, axis) });
+    site.page(&Page {
+        file: "wide_views.html",
+        template: "wide_views.j2",
+        title: "Wide views",
+        scripts: &[],
+        values: context! {
+            views => scenes.map_or(0, |scenes| scenes.values().map(BTreeMap::len).sum()),
+            scenes => scenes.map_or(0, BTreeMap::len),
+            sections => Serde(&sections),
+        },
+    })
+}
+
+/// Whether any submission was made from perturbed geometry.
+pub(super) fn has_perturbed(board: &Board<'_>) -> bool {
+    board.results.iter().any(|result| result.submission.geometry.is_some())
+}
+
+/// Writes the page, if any submission was made from perturbed geometry.
+pub(super) fn write_perturbed(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    if !has_perturbed(board) {
+        return Ok(());
+    }
+    let sections: Vec<Section> = PerturbationKind::ALL.into_iter().filter_map(|kind| section(board, kind)).collect();
+    site.page(&Page {
+        file: "perturbed.html",
+        template: "perturbed.j2",
+        title: "Imperfect geometry",
+        scripts: &[],
+        values: context! { sections => Serde(&sections) },
+    })
+}
+
+/// The charts of one kind; none where no submission was made from such geometry.
+fn section(board: &Board<'_>, kind: PerturbationKind) -> Option<Section> {
+    let mut stated = board.results.iter().filter_map(|result| result.submission.geometry);
+    if !stated.any(|perturbation| perturbation.kind == kind) {
+        return None;
+    }
+    let charts: Vec<Chart> = headlines(&board.columns)
+        .into_iter()
+        .filter_map(|column| {
+            let title = format!("{}, {}", column.title, column.metric_title);
+            let level = |level| if level == 0 { "true".to_owned() } else { format!("level {level}") };
+            Chart::new(title, level, &by_level(board, kind, column), |value| column.text(value))
+        })
+        .collect();
+    let title = match kind {
+        PerturbationKind::Pose => "Furniture that is moved and turned",
+        PerturbationKind::Scale => "Furniture that is enlarged or reduced",
+        PerturbationKind::Shape => "Furniture whose surface is bent",
+    };
+    Some(Section { title: title.to_owned(), charts })
+}
+
+/// The values of the methods that have one of this kind, by level; level 0 is the true geometry.
+fn by_level<'a>(board: &'a Board<'_>, kind: PerturbationKind, column: &Column) -> Vec<Values<'a>> {
+    let mut lines: Vec<Values<'_>> = Vec::new();
+    for at in board.best_first() {
+        let result = &board.results[at];
+        let level = match result.submission.geometry {
+            None => 0,
+            Some(perturbation) if perturbation.kind == kind => perturbation.level,
+            Some(_) => continue,
+        };
+        let Some(value) = board.scores[at].summary.get(&column.key) else { continue };
+        let place = lines.iter().position(|(name, _)| *name == result.method).unwrap_or(lines.len());
+        if place == lines.len() {
+            lines.push((&result.method, BTreeMap::new()));
+        }
+        // Of several submissions of a method at one level, the one that the board lists first counts.
+        lines[place].1.entry(level).or_insert(*value);
+    }
+    lines.retain(|(_, values)| values.keys().any(|level| *level > 0));
+    lines
+}
+
+struct Method<'a> {
+    name: &'a str,
+    pictures: &'a [PictureValues],
+    wide_views: &'a BTreeMap<SceneId, BTreeMap<ViewId, WideView>>,
+}
+
+/// By what views are sorted into classes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Axis {
+    /// Centimetres from the input camera; the input view is at 0.
+    Distance,
+    /// Fifths of the valid pixels that the input view does not show.
+    UnseenShare,
+}
+
+/// The charts of every kind of picture and metric that wide views have values of.
+fn charts(methods: &[Method<'_>], axis: Axis) -> Vec<Chart> {
+    let mut kinds: Vec<(PictureName, Metric)> = Vec::new();
+    let pictures = methods.iter().flat_map(|method| method.pictures);
+    for picture in pictures.filter(|picture| picture.view.is_wide() && is_in_curves(picture)) {
+        for metric in picture.values.keys() {
+            let kind = (picture.picture, *metric);
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+    }
+    kinds.into_iter().filter_map(|kind| chart(methods, axis, kind)).collect()
+}
+
+fn chart(methods: &[Method<'_>], axis: Axis, (picture, metric): (PictureName, Metric)) -> Option<Chart> {
+    let means: Vec<Values<'_>> =
+        methods.iter().map(|method| (method.name, means(method, axis, picture, metric))).collect();
+    let title = format!("{}, {}", picture.kind.title(), metric.style().title);
+    Chart::new(title, |class| class_title(axis, class), &means, |value| metric.style().text(value))
+}
+
+/// The mean of a method's values in each class.
+fn means(method: &Method<'_>, axis: Axis, picture: PictureName, metric: Metric) -> BTreeMap<u32, f64> {
+    let mut sums: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
+    for of_view in method.pictures.iter().filter(|values| values.picture == picture && is_in_curves(values)) {
+        let (Some(class), Some(number)) = (class_of(method, axis, of_view), of_view.values.get(&metric)) else {
+            continue;
+        };
+        let (sum, count) = sums.entry(class).or_default();
+        *sum += number;
+        *count += 1.0;
+    }
+    sums.into_iter().map(|(class, (sum, count))| (class, sum / count)).collect()
+}
+
+fn class_of(method: &Method<'_>, axis: Axis, picture: &PictureValues) -> Option<u32> {
+    let wide = method.wide_views.get(&picture.scene)?;
+    match (axis, wide.get(&picture.view)) {
+        (Axis::Distance, Some(view)) => Some((100.0 * view.distance_m).round() as u32),
+        (Axis::Distance, None) => (picture.view.as_str() == INPUT).then_some(0),
+        (Axis::UnseenShare, Some(view)) => {
+            Some(((f64::from(SHARES) * view.unseen_share).floor() as u32).min(SHARES - 1))
+        }
+        (Axis::UnseenShare, None) => None,
+    }
+}
+
+fn class_title(axis: Axis, class: u32) -> String {
+    match axis {
+        Axis::Distance => format!("{:.2} m", f64::from(class) / 100.0),
+        Axis::UnseenShare => format!("{} to {} %", 100 * class / SHARES, 100 * (class + 1) / SHARES),
+    }
+}
+
+/// A chart. The heading of its classes and the text of its values are the caller's.
+#[derive(Debug, PartialEq, Serialize)]
+struct Chart {
+    title: String,
+    /// The classes of values, from left to right.
+    classes: Vec<String>,
+    /// The place of each class, in units of the chart.
+    columns: Vec<f64>,
+    /// The places of the top and bottom lines, and their values.
+    scale: [(f64, String); 2],
+    lines: Vec<Line>,
+}
+
+/// The line of one method.
+#[derive(Debug, PartialEq, Serialize)]
+struct Line {
+    name: String,
+    /// Places of the points, as SVG states them.
+    points: String,
+    dots: Vec<[f64; 2]>,
+    /// The values of all classes.
+    cells: Vec<Option<String>>,
+}
+
+/// The values of a method by class; lines have the classes' numbers as their places.
+type Values<'a> = (&'a str, BTreeMap<u32, f64>);
+
+impl Chart {
+    /// None where there are fewer than two classes, which make no line.
+    fn new(
+        title: String,
+        class_title: impl Fn(u32) -> String,
+        methods: &[Values<'_>],
+        text: impl Fn(f64) -> String,
+    ) -> Option<Self> {
+        let classes: BTreeSet<u32> = methods.iter().flat_map(|(_, values)| values.keys().copied()).collect();
+        if classes.len() < 2 {
+            return None;
+        }
+        let values = || methods.iter().flat_map(|(_, values)| values.values()).copied();
+        let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let [width, height] = SIZE;
+        let (first, last) = (*classes.first()?, *classes.last()?);
+        let column = |class: u32| {
+            let share = f64::from(class - first) / f64::from(last - first);
+            rounded(MARGIN[0] + share * (width - 2.0 * MARGIN[0]))
+        };
+        let row = |value: f64| {
+            let share = if high > low { (high - value) / (high - low) } else { 0.5 };
+            rounded(MARGIN[1] + share * (height - 2.0 * MARGIN[1]))
+        };
+        let line = |(name, values): &Values<'_>| {
+            let dots: Vec<[f64; 2]> = values.iter().map(|(class, value)| [column(*class), row(*value)]).collect();
+            Line {
+                name: (*name).to_owned(),
+                points: dots.iter().map(|[x, y]| format!("{x},{y}")).collect::<Vec<_>>().join(" "),
+                dots,
+                cells: classes.iter().map(|class| Some(text(*values.get(class)?))).collect(),
+            }
+        };
+        Some(Self {
+            title,
+            classes: classes.iter().map(|class| class_title(*class)).collect(),
+            columns: classes.iter().map(|class| column(*class)).collect(),
+            scale: [high, low].map(|value| (row(value), text(value))),
+            lines: methods.iter().map(line).collect(),
+        })
+    }
+}
+
+/// Charts under one heading.
+#[derive(Serialize)]
+struct Section {
+    title: String,
+    charts: Vec<Chart>,
+}
+
+fn rounded(place: f64) -> f64 {
+    (10.0 * place).round() / 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_eval::result_key::{PictureKind, Region};
+
+    use super::*;
+
+    #[test]
+    fn the_highest_is_at_the_top_and_the_first_class_on_the_left() {
+        let methods = [("a", BTreeMap::from([(2, 30.0), (3, 25.0), (6, 10.0)])), ("b", BTreeMap::from([(2, 10.0)]))];
+        let chart = Chart::new("t".to_owned(), |class| class.to_string(), &methods, |v| format!("{v:.1}")).unwrap();
+        assert_eq!(chart.classes, ["2", "3", "6"]);
+        let [width, height] = SIZE;
+        let (left, right) = (MARGIN[0], width - MARGIN[0]);
+        assert_eq!(chart.lines[0].dots, [[left, MARGIN[1]], [left + 66.0, 53.0], [right, height - MARGIN[1]]]);
+        assert_eq!(chart.lines[1].cells, [Some("10.0".to_owned()), None, None]);
+        assert_eq!(chart.scale, [(MARGIN[1], "30.0".to_owned()), (height - MARGIN[1], "10.0".to_owned())]);
+        let one = [("a", BTreeMap::from([(2, 30.0)]))];
+        assert_eq!(Chart::new("t".to_owned(), |class| class.to_string(), &one, |v| v.to_string()), None);
+    }
+
+    fn value(view: &str, number: f64) -> PictureValues {
+        PictureValues {
+            scene: SceneId::new("a").unwrap(),
+            view: ViewId::new(view).unwrap(),
+            picture: PictureName::whole(PictureKind::Albedo),
+            lighting: None,
+            region: Region::Valid,
+            pixels: 1,
+            values: BTreeMap::from([(Metric::Psnr, number)]),
+            mse_error: None,
+            exact: false,
+            lower_bound: false,
+        }
+    }
+
+    fn wide(distance_m: f64, unseen_share: f64) -> WideView {
+        WideView { distance_m, unseen_share }
+    }
+
+    #[test]
+    fn values_are_sorted_into_classes() {
+        let pictures = [
+            value("input", 40.0),
+            value("up_left", 35.0),
+            value("wide_1", 30.0),
+            value("wide_2", 20.0),
+            value("wide_3", 10.0),
+        ];
+        let views = [("wide_1", wide(0.3, 0.1)), ("wide_2", wide(0.3, 0.19)), ("wide_3", wide(1.0, 1.0))];
+        let views = views.map(|(id, view)| (ViewId::new(id).unwrap(), view));
+        let wide_views = BTreeMap::from([(SceneId::new("a").unwrap(), BTreeMap::from(views))]);
+        let methods = [Method { name: "m", pictures: &pictures, wide_views: &wide_views }];
+        let cells = |axis| {
+            let charts = charts(&methods, axis);
+            assert_eq!(charts.len(), 1);
+            let cells: Vec<String> = charts[0].lines[0].cells.iter().flatten().cloned().collect();
+            (charts[0].classes.clone(), cells)
+        };
+        let titles = |titles: &[&str]| titles.iter().map(|title| (*title).to_owned()).collect::<Vec<_>>();
+        assert_eq!(
+            cells(Axis::Distance),
+            (titles(&["0.00 m", "0.30 m", "1.00 m"]), titles(&["40.00", "25.00", "10.00"]))
+        );
+        assert_eq!(cells(Axis::UnseenShare), (titles(&["0 to 20 %", "80 to 100 %"]), titles(&["25.00", "10.00"])));
+    }
+}

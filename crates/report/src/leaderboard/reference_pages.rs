@@ -1,0 +1,236 @@
+//! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers were
+//! measured on other renders and are never ranked with results.
+
+use mateval_eval::metric::{Better, Metric};
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result_key::{PictureKind, Views};
+use minijinja::context;
+use minijinja::value::Serde;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::board::Board;
+use super::entries::ErrataFile;
+use super::file::LeaderboardDataset;
+use super::site::{Page, SiteWriter};
+use crate::error::ReportError;
+use crate::ranking::file::{IntervalKind, RankingRules};
+
+const TABLES: &str = include_str!("paper_tables.json");
+
+/// Writes `protocol.html`, `paper.html` and `errata.html`.
+pub(super) fn write(board: &Board<'_>, errata: Option<&ErrataFile>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    write_protocol(board, site)?;
+    let paper = paper_page();
+    site.page(&Page {
+        file: "paper.html",
+        template: "paper.j2",
+        title: "The paper's numbers",
+        scripts: &["sort.js"],
+        values: context! { paper => Serde(&paper) },
+    })?;
+    let errata = errata.map_or(&[][..], |errata| &errata.entries);
+    site.page(&Page {
+        file: "errata.html",
+        template: "errata.j2",
+        title: "Errata",
+        scripts: &[],
+        values: context! { errata => Serde(errata) },
+    })
+}
+
+#[derive(Serialize)]
+struct ProtocolPage<'a> {
+    dataset: &'a LeaderboardDataset,
+    weights: Option<&'a String>,
+    protocol_sha256: String,
+    rules: Vec<(String, String)>,
+    ranking: &'a RankingRules,
+    percent: u32,
+    /// How intervals were found; none if there are no intervals.
+    kind: Option<IntervalKind>,
+}
+
+/// Writes `protocol.html`: the fingerprint and everything that it is a hash of.
+fn write_protocol(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let (Some(result), Some(scores)) = (board.results.first(), board.scores.first()) else { return Ok(()) };
+    let rules = &board.ranking().rules;
+    let intervals = board.ranking().keys.values().flat_map(|key| &key.standings);
+    let page = ProtocolPage {
+        dataset: &board.file.dataset,
+        weights: result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_ref),
+        protocol_sha256: scores.protocol.sha256(),
+        rules: rules_of(&scores.protocol),
+        ranking: rules,
+        percent: (100.0 * rules.confidence).round() as u32,
+        kind: intervals.filter_map(|standing| standing.interval).map(|interval| interval.kind).next(),
+    };
+    site.page(&Page {
+        file: "protocol.html",
+        template: "protocol.j2",
+        title: "Protocol",
+        scripts: &[],
+        values: context! { page => Serde(&page) },
+    })
+}
+
+/// Every number and word of a protocol, with the path of its key.
+fn rules_of(protocol: &Protocol) -> Vec<(String, String)> {
+    let mut rules = Vec::new();
+    // From its JSON text, which gives single-precision numbers with as few digits as they need.
+    let value = serde_json::from_str(&mateval_scene::json::to_text(protocol)).unwrap_or(Value::Null);
+    leaves(&value, String::new(), &mut rules);
+    rules
+}
+
+fn leaves(value: &Value, path: String, rules: &mut Vec<(String, String)>) {
+    match value {
+        Value::Object(map) => {
+            let join = |key: &String| if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+            map.iter().for_each(|(key, value)| leaves(value, join(key), rules));
+        }
+        Value::Array(values) => {
+            let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            rules.push((path, values.iter().map(text).collect::<Vec<_>>().join(", ")));
+        }
+        Value::String(word) => rules.push((path, word.clone())),
+        other => rules.push((path, other.to_string())),
+    }
+}
+
+#[derive(Deserialize)]
+struct PaperTables {
+    source: String,
+    note: String,
+    rows: Vec<PaperRow>,
+}
+
+#[derive(Deserialize)]
+struct PaperRow {
+    family: String,
+    method: String,
+    /// The maps that the method itself estimates, as `a`, `r`, `m`; null if the paper does not state them.
+    estimated: Option<Vec<String>>,
+    scores: Vec<PaperScores>,
+}
+
+/// A block of four numbers. The paper does not state the network of its LPIPS, so that they have no result keys.
+#[derive(Deserialize)]
+struct PaperScores {
+    picture: PictureKind,
+    views: Views,
+    /// In units of 1e-3, as printed.
+    mse: f64,
+    psnr: f64,
+    ssim: f64,
+    lpips: f64,
+}
+
+/// The tables as the page shows them.
+#[derive(Serialize)]
+struct PaperPage {
+    source: String,
+    note: String,
+    tables: Vec<PaperTable>,
+}
+
+#[derive(Serialize)]
+struct PaperTable {
+    title: &'static str,
+    /// The heads of a block's columns.
+    metrics: [String; 4],
+    blocks: Vec<&'static str>,
+    rows: Vec<ShownRow>,
+}
+
+#[derive(Serialize)]
+struct ShownRow {
+    family: String,
+    method: String,
+    cells: Vec<String>,
+}
+
+/// A block's title, picture and views.
+type Block = (&'static str, PictureKind, Views);
+
+/// Number and title, and the blocks.
+type Words = (&'static str, &'static [Block]);
+
+const LAYOUT: [Words; 4] = [
+    (
+        "Table II: RGB, fitted light",
+        &[("Input view", PictureKind::RgbFitted, Views::Input), ("Novel views", PictureKind::RgbFitted, Views::Novel)],
+    ),
+    (
+        "Table III: albedo, input view",
+        &[("Albedo", PictureKind::Albedo, Views::Input), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Input)],
+    ),
+    (
+        "Table IV: albedo, novel views",
+        &[("Albedo", PictureKind::Albedo, Views::Novel), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Novel)],
+    ),
+    (
+        "Table V: aligned albedo, unobserved regions",
+        &[("Aligned albedo", PictureKind::AlbedoAligned, Views::Unobserved)],
+    ),
+];
+
+const METRICS: [Metric; 4] = [Metric::Mse, Metric::Psnr, Metric::Ssim, Metric::LpipsAlex];
+
+fn metric_head(metric: Metric) -> String {
+    let arrow = match metric.better() {
+        Better::Lower => "↓",
+        Better::Higher => "↑",
+    };
+    format!("{} {arrow}", metric.style().title)
+}
+
+/// The tables, ready to be shown.
+fn paper_page() -> PaperPage {
+    let tables: PaperTables = serde_json::from_str(TABLES).expect("a test reads the file");
+    let table = |(title, blocks): Words| PaperTable {
+        title,
+        metrics: METRICS.map(metric_head),
+        blocks: blocks.iter().map(|(title, ..)| *title).collect(),
+        rows: tables.rows.iter().filter_map(|row| shown(row, blocks)).collect(),
+    };
+    PaperPage { source: tables.source, note: tables.note, tables: LAYOUT.map(table).into() }
+}
+
+/// None if the paper leaves the row out of the table.
+fn shown(row: &PaperRow, blocks: &[Block]) -> Option<ShownRow> {
+    let cells = |(_, picture, views): &Block| -> [Option<String>; 4] {
+        let found = row.scores.iter().find(|scores| scores.picture == *picture && scores.views == *views);
+        let text = |metric: Metric, value: f64| Some(format!("{value:.*}", metric.style().digits));
+        found.map_or([const { None }; 4], |PaperScores { mse, psnr, ssim, lpips, .. }| {
+            let values = [mse, psnr, ssim, lpips];
+            std::array::from_fn(|at| text(METRICS[at], *values[at]))
+        })
+    };
+    let cells: Vec<Option<String>> = blocks.iter().flat_map(cells).collect();
+    let maps = row.estimated.as_ref().map(|maps| format!(" ({})", maps.join(", ")));
+    cells.iter().any(Option::is_some).then(|| ShownRow {
+        family: row.family.clone(),
+        method: format!("{}{}", row.method, maps.unwrap_or_default()),
+        cells: cells.into_iter().map(|cell| cell.unwrap_or_else(|| "-".to_owned())).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first row of Table III; Table II has more rows than the others.
+    #[test]
+    fn the_papers_numbers() {
+        let page = paper_page();
+        let rows: Vec<usize> = page.tables.iter().map(|table| table.rows.len()).collect();
+        assert_eq!(rows, [18, 10, 10, 10]);
+        let first = &page.tables[1].rows[0];
+        assert_eq!(
+            (first.method.as_str(), first.cells[0].as_str(), first.cells[5].as_str()),
+            ("PSDR-Room", "46.911", "17.59")
+        );
+        assert!(page.tables.iter().flat_map(|table| &table.rows).all(|row| !row.cells.contains(&"-".to_owned())));
+    }
+}

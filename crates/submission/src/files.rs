@@ -1,0 +1,150 @@
+//! The files of a submission: where they lie, their bytes, and the hashes of these same bytes.
+//!
+//! Scoring, verification and `eval lint` read a submission's files here and nowhere else, each once. If a file is replaced
+//! during a run, the result therefore has the hash of the bytes that were scored, never that of the other version.
+//!
+//! The files are untrusted input: nothing outside the submission's folder is read, and no more than a given size.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use mateval_image::limits::read_at_most;
+use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::submission::{MAX_SUBMISSION_BYTES, Map, SUBMISSION, SubmissionFile, instance_folder};
+use mateval_scene::{InstanceId, SceneId};
+use serde::Serialize;
+
+use crate::error::{FileFault, SubmissionError};
+
+/// A file of a submission and the hash of the bytes that were read from it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct HashedFile {
+    /// Relative to the submission's folder, with forward slashes.
+    pub path: String,
+    /// SHA-256, hex.
+    pub sha256: String,
+}
+
+/// The hash of a submission: SHA-256 over a line `<sha256>  <path>` for each file, in the order given. Results list
+/// `submission.json` first, then the maps scene by scene.
+pub fn submission_sha256(files: &[HashedFile]) -> String {
+    let lines: String = files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
+    sha256_of_bytes(lines.as_bytes())
+}
+
+/// The bytes of a file and their hash.
+pub struct SubmittedFile {
+    path: PathBuf,
+    hashed: HashedFile,
+    bytes: Vec<u8>,
+}
+
+impl SubmittedFile {
+    /// Reads a file of at most `most` bytes that lies in the folder `submission`.
+    pub fn read(submission: &Path, path: &Path, most: u64) -> Result<Self, FileFault> {
+        let place = place_inside(submission, path)?;
+        let bytes = read_at_most(&place, most).map_err(|error| match error.kind() {
+            ErrorKind::FileTooLarge => {
+                let action = "save it with compression, or with fewer texels";
+                FileFault::new("file_too_large", format!("more than {most} bytes"), action)
+            }
+            _ => FileFault::unreadable(&error),
+        })?;
+        Ok(Self::from_bytes(submission, path, bytes))
+    }
+
+    /// A file that has been read already.
+    pub fn from_bytes(submission: &Path, path: &Path, bytes: Vec<u8>) -> Self {
+        let hashed = HashedFile { path: relative(submission, path), sha256: sha256_of_bytes(&bytes) };
+        Self { path: path.to_owned(), hashed, bytes }
+    }
+
+    /// Where it was read; its ending says what kind of file it should be.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its path in the submission and the hash of its bytes.
+    pub fn hashed(&self) -> &HashedFile {
+        &self.hashed
+    }
+
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Gives up the bytes, so that a decoder need not copy them.
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+}
+
+/// A path relative to the submission's folder, with forward slashes.
+pub(crate) fn relative(submission: &Path, path: &Path) -> String {
+    path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}
+
+/// Where a file lies once links are followed. Fails where that is outside the submission's folder, or no ordinary file.
+fn place_inside(submission: &Path, path: &Path) -> Result<PathBuf, FileFault> {
+    let unreadable = |error: std::io::Error| FileFault::unreadable(&error);
+    let place = path.canonicalize().map_err(|error| match error.kind() {
+        ErrorKind::NotFound => {
+            FileFault::new("broken_link", "a link to a file that does not exist", "replace the link by the file itself")
+        }
+        _ => unreadable(error),
+    })?;
+    if !place.starts_with(submission.canonicalize().map_err(unreadable)?) {
+        let message = "a link that leads out of the submission's folder; it is not followed";
+        return Err(FileFault::new("link_leads_out", message, "replace the link by the file itself"));
+    }
+    if !place.metadata().map_err(unreadable)?.is_file() {
+        return Err(FileFault::new("not_a_file", "not an ordinary file", "replace it by an ordinary file"));
+    }
+    Ok(place)
+}
+
+/// What `submission.json` states, and the hash of its bytes.
+#[derive(Clone, Debug)]
+pub struct SubmissionJson {
+    /// The method and how the submission was made.
+    pub file: SubmissionFile,
+    /// Of the bytes that [`SubmissionJson::file`] was parsed from.
+    pub hashed: HashedFile,
+}
+
+impl SubmissionJson {
+    /// Reads it from a submission's folder. Fails where it is missing, a link that leads out, or of another format.
+    pub fn read(submission: &Path) -> Result<Self, SubmissionError> {
+        let path = submission.join(SUBMISSION);
+        path.symlink_metadata().map_err(SubmissionError::io("read", &path))?;
+        let source = SubmittedFile::read(submission, &path, MAX_SUBMISSION_BYTES)
+            .map_err(|fault| SubmissionError::File { path: path.clone(), fault })?;
+        Ok(Self { file: SubmissionFile::parse(&path, source.bytes())?, hashed: source.hashed().clone() })
+    }
+}
+
+/// The instance that maps belong to, in one submission.
+#[derive(Clone, Copy)]
+pub(crate) struct MapFolder<'a> {
+    pub(crate) submission: &'a Path,
+    pub(crate) scene: &'a SceneId,
+    pub(crate) instance: &'a InstanceId,
+}
+
+impl MapFolder<'_> {
+    /// The two places of a map: as PNG, as EXR.
+    pub(crate) fn candidates(&self, map: Map) -> [PathBuf; 2] {
+        let folder = instance_folder(self.submission, self.scene, self.instance);
+        ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending))
+    }
+
+    /// Those of the two that exist.
+    pub(crate) fn present(&self, map: Map) -> Vec<PathBuf> {
+        self.candidates(map).into_iter().filter(|path| exists(path)).collect()
+    }
+}
+
+/// Whether anything exists at a path, a link that leads nowhere included.
+pub(crate) fn exists(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
