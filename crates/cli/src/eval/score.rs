@@ -1,23 +1,68 @@
-//! `mateval eval score`: scores submissions on a dataset.
+//! The commands that judge submissions: `mateval eval lint`, `score`, `verify` and `image`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use mateval_eval::protocol::Protocol;
-use mateval_eval::score::{ScorePlan, score};
-use mateval_metrics::Net;
+use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
+use mateval_metrics::{Lpips, Net};
+use mateval_report::pair::{PairValues, compare};
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::is_inside;
 use mateval_scene::{SceneId, json};
+use mateval_submission::SubmissionError;
 use mateval_submission::archive::{self, Opened};
+use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
-use crate::bars::with_progress;
-use crate::outcome::{Outcome, print, say_findings};
-use crate::output_file::check_output_file;
-use crate::tool::TOOL;
-use crate::weights;
+use crate::TOOL;
+use crate::arguments::{Format, check_output_file};
+use crate::fetch::{FETCH_LPIPS, load_weights};
+use crate::terminal::{Outcome, print, say_findings, with_progress};
 
-/// Arguments of `eval score`.
+#[derive(clap::Args)]
+pub struct LintArgs {
+    /// The submission: a folder, a .zip or a .tar.gz archive.
+    submission: PathBuf,
+    /// Folder of the dataset; its ground truth is not needed.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// File for the report, as JSON.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// How to print the report.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// Replace a report that already exists.
+    #[arg(long)]
+    force: bool,
+}
+
+impl LintArgs {
+    /// Checks the submission; the answer is no where it has an error.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        self.out.iter().try_for_each(|out| check_output_file(out, "--out", "report", self.force))?;
+        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let file = lint_report(self, &dataset).context("cannot check the submission")?;
+        self.out.iter().try_for_each(|out| json::write(out, &file))?;
+        print(&match self.format {
+            Format::Json => json::to_text(&file),
+            Format::Text => plain(&file),
+        })?;
+        Ok(if file.good { Outcome::Good } else { Outcome::No })
+    }
+}
+
+fn lint_report(args: &LintArgs, dataset: &Dataset) -> Result<LintFile, SubmissionError> {
+    let opened = match archive::open(&args.submission, &std::env::temp_dir()) {
+        // An unsound archive is a result of the check, not a failure to check.
+        Err(SubmissionError::Archive { findings, .. }) => return Ok(refused(dataset, TOOL, findings)),
+        opened => opened?,
+    };
+    let plan = LintPlan { dataset, submission: opened.root(), tool: TOOL.to_owned() };
+    with_progress(|progress| lint(&plan, progress))
+}
+
 #[derive(clap::Args)]
 pub struct ScoreArgs {
     /// Submissions: folders, .zip or .tar.gz archives.
@@ -56,51 +101,53 @@ pub struct ScoreArgs {
     force: bool,
 }
 
-/// Scores the submissions, writes a result file for each and prints its path.
-pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
-    let protocols = args.protocols.iter().map(|name| Protocol::named(name)).collect::<Result<Vec<_>, _>>()?;
-    let outs = args.result_paths();
-    for (place, path) in
-        [("--out", Some(&args.out)), ("--cache", args.cache.as_ref()), ("--pictures", args.pictures.as_ref())]
-    {
-        if let Some(path) = path.filter(|path| is_inside(path, &args.dataset)) {
-            bail!(
-                "'{}' would lie in the dataset, whose manifest does not list it; choose another {place}",
-                path.display()
-            );
+impl ScoreArgs {
+    /// Scores the submissions, writes a result file for each and prints its path.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let protocols = self.protocols.iter().map(|name| Protocol::named(name)).collect::<Result<Vec<_>, _>>()?;
+        let outs = self.result_paths();
+        for (place, path) in
+            [("--out", Some(&self.out)), ("--cache", self.cache.as_ref()), ("--pictures", self.pictures.as_ref())]
+        {
+            if let Some(path) = path.filter(|path| is_inside(path, &self.dataset)) {
+                bail!(
+                    "'{}' would lie in the dataset, whose manifest does not list it; choose another {place}",
+                    path.display()
+                );
+            }
         }
+        check_results(&outs, self)?;
+        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let work = std::env::temp_dir();
+        let opened = self.submissions.iter().map(|path| archive::open(path, &work)).collect::<Result<Vec<_>, _>>()?;
+        let cache = self.cache.clone().unwrap_or_else(|| cache_beside(&self.out));
+        if self.cache.is_some() && !self.only_cached {
+            // A folder that cannot be made is found before anything is scored.
+            std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
+        }
+        let plan = ScorePlan {
+            dataset: &dataset,
+            submissions: opened.iter().map(Opened::root).collect(),
+            protocols,
+            scenes: self.scenes.clone(),
+            lpips: load_weights(Net::Alex),
+            tool: TOOL.to_owned(),
+            jobs: usize::from(self.jobs),
+            cache: Some(&cache),
+            only_cached: self.only_cached,
+            pictures: self.pictures.as_deref(),
+        };
+        let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
+        for (result, out) in results.iter().zip(&outs) {
+            json::write_lines(out, result)?;
+            say_findings(&result.method, &result.findings, &out.display().to_string());
+            print(&format!("{}\n", out.display()))?;
+        }
+        if self.cache.is_none() && cache.exists() {
+            std::fs::remove_dir_all(&cache).with_context(|| format!("cannot remove '{}'", cache.display()))?;
+        }
+        Ok(Outcome::Good)
     }
-    check_results(&outs, args)?;
-    let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
-    let work = std::env::temp_dir();
-    let opened = args.submissions.iter().map(|path| archive::open(path, &work)).collect::<Result<Vec<_>, _>>()?;
-    let cache = args.cache.clone().unwrap_or_else(|| cache_beside(&args.out));
-    if args.cache.is_some() && !args.only_cached {
-        // A folder that cannot be made is found before anything is scored.
-        std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
-    }
-    let plan = ScorePlan {
-        dataset: &dataset,
-        submissions: opened.iter().map(Opened::root).collect(),
-        protocols,
-        scenes: args.scenes.clone(),
-        lpips: weights::load(Net::Alex),
-        tool: TOOL.to_owned(),
-        jobs: usize::from(args.jobs),
-        cache: Some(&cache),
-        only_cached: args.only_cached,
-        pictures: args.pictures.as_deref(),
-    };
-    let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
-    for (result, out) in results.iter().zip(&outs) {
-        json::write_lines(out, result)?;
-        say_findings(&result.method, &result.findings, &out.display().to_string());
-        print(&format!("{}\n", out.display()))?;
-    }
-    if args.cache.is_none() && cache.exists() {
-        std::fs::remove_dir_all(&cache).with_context(|| format!("cannot remove '{}'", cache.display()))?;
-    }
-    Ok(Outcome::Good)
 }
 
 impl ScoreArgs {
@@ -140,4 +187,146 @@ fn submission_name(path: &Path) -> String {
     let name = whole.file_name().map_or_else(|| "submission".to_owned(), |name| name.to_string_lossy().into_owned());
     let stem = [".zip", ".tar.gz", ".tgz"].iter().find_map(|ending| name.strip_suffix(ending).map(str::to_owned));
     stem.unwrap_or(name)
+}
+
+#[derive(clap::Args)]
+pub struct VerifyArgs {
+    /// The RESULT.json file.
+    #[arg(value_name = "RESULT.json")]
+    result: PathBuf,
+    /// The submission that was scored: a folder, a .zip or a .tar.gz archive.
+    #[arg(long)]
+    submission: PathBuf,
+    /// Folder of the dataset that it was scored on.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// File for the verification. A leaderboard finds that of `NAME.json` by the name `NAME.verified.json`, in the same
+    /// folder.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Number of scenes that are scored at once.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    jobs: u8,
+    /// How to print the verification.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// Replace a verification that already exists.
+    #[arg(long)]
+    force: bool,
+}
+
+impl VerifyArgs {
+    /// Scores again and compares; the answer is no where a number differs.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        self.out.iter().try_for_each(|out| check_output_file(out, "--out", "verification", self.force))?;
+        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let opened = archive::open(&self.submission, &std::env::temp_dir())?;
+        let plan = VerifyPlan {
+            result: &self.result,
+            submission: opened.root(),
+            dataset: &dataset,
+            lpips: load_weights(Net::Alex),
+            tool: TOOL.to_owned(),
+            jobs: usize::from(self.jobs),
+        };
+        let found = with_progress(|progress| verify(plan, progress)).context("cannot verify")?;
+        self.out.iter().try_for_each(|out| json::write(out, &found))?;
+        print(&match self.format {
+            Format::Json => json::to_text(&found),
+            Format::Text => verification_text(&found),
+        })?;
+        Ok(if found.confirmed { Outcome::Good } else { Outcome::No })
+    }
+}
+
+fn verification_text(found: &VerificationFile) -> String {
+    let mut lines: Vec<String> = found.findings.iter().map(ToString::to_string).collect();
+    let unlisted = found.differences.saturating_sub(found.findings.len());
+    if unlisted > 0 {
+        lines.push(format!("{unlisted} more values differ"));
+    }
+    lines.push(match (found.confirmed, found.differences) {
+        (true, _) => "confirmed: every number was computed again and is the same".to_owned(),
+        (false, 0) => "not confirmed: the result was not made from this submission and dataset".to_owned(),
+        (false, count) => format!("not confirmed: {count} values differ"),
+    });
+    lines.join("\n") + "\n"
+}
+
+#[derive(clap::Args)]
+pub struct ImageArgs {
+    /// The picture to judge: 8-bit sRGB PNG or linear EXR.
+    prediction: PathBuf,
+    /// The true picture, of the same size: 8-bit sRGB PNG or linear EXR.
+    reference: PathBuf,
+    /// 8-bit grey PNG of the same size: 255 where pixels count, 0 elsewhere.
+    #[arg(long)]
+    mask: Option<PathBuf>,
+    /// Network of LPIPS; may be given several times.
+    #[arg(long = "net", value_name = "NET", value_enum, default_values = ["alex"])]
+    nets: Vec<NetName>,
+    /// How to print the metrics.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum NetName {
+    Alex,
+    Vgg,
+}
+
+impl ImageArgs {
+    /// Compares the pictures and prints the metrics.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let mut nets: Vec<Lpips> = Vec::new();
+        let mut missing = Vec::new();
+        for name in &self.nets {
+            let net = if *name == NetName::Alex { Net::Alex } else { Net::Vgg };
+            match load_weights(net) {
+                LpipsWeights::Loaded(lpips) => nets.push(*lpips),
+                LpipsWeights::Missing { reason, .. } => missing.push((net.key(), reason)),
+            }
+        }
+        let values = compare(&self.prediction, &self.reference, self.mask.as_deref(), &nets)?;
+        match self.format {
+            Format::Json => print(&json::to_text(&serde_json::json!({
+                "format": "mateval-image/1",
+                "tool": TOOL,
+                "values": values,
+                "missing": missing
+                    .iter()
+                    .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "fix": FETCH_LPIPS }))
+                    .collect::<Vec<_>>(),
+            })))?,
+            Format::Text => print(&image_text(&values, &missing))?,
+        }
+        Ok(Outcome::Good)
+    }
+}
+
+fn image_text(values: &PairValues, missing: &[(&str, String)]) -> String {
+    let mut lines = Vec::new();
+    let mut line = |name: &str, value: Option<f64>| {
+        lines.push(format!("{name:24} {}", value.map_or("none".to_owned(), |value| format!("{value:.6}"))));
+    };
+    line("mse", values.mse);
+    line("psnr_db", values.psnr);
+    line("ssim", values.ssim);
+    for net in &values.lpips {
+        line(&net.metric, net.value);
+    }
+    if let Some(masked) = &values.masked {
+        line("masked mse", masked.mse);
+        line("masked psnr_db", masked.psnr);
+        line("masked ssim inside", masked.ssim_inside);
+        line("masked ssim black_fill", masked.ssim_black_fill);
+        for (rule, nets) in [("inside", &masked.lpips_inside), ("black_fill", &masked.lpips_black_fill)] {
+            for net in nets {
+                line(&format!("masked {} {rule}", net.metric), net.value);
+            }
+        }
+    }
+    lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {FETCH_LPIPS}")));
+    lines.join("\n") + "\n"
 }
