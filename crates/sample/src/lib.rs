@@ -6,22 +6,17 @@
 //!
 //! The bytes are the same on every machine.
 //!
-//! `solid` builds meshes, `furniture` combines them into objects, `pattern` paints the textures, and `room` places the
-//! objects and writes the XML. `house` uses the first three.
+//! `solid` builds meshes and combines them into furniture, `pattern` paints the textures, and `room` places the furniture
+//! and writes the XML. `house` also uses the first two.
 
-mod files;
-pub mod furniture;
 pub mod house;
 pub mod pattern;
 mod room;
 pub mod solid;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mateval_image::png_io::write_rgb_bytes;
-
-pub use files::SampleError;
-use files::{create_folder, write_text};
 
 /// The room's licence file: CC0 1.0.
 const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
@@ -98,6 +93,36 @@ fn write_room(out: &Path) -> Result<(), SampleError> {
     write_text(&room.join("scene.xml"), &room::xml())
 }
 
+/// Why the built-in scenes could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SampleError {
+    /// An operation of the file system failed.
+    #[error("cannot {action} '{}': {source}", path.display())]
+    Io {
+        /// The operation, as in "read" or "write".
+        action: &'static str,
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    /// A picture could not be written.
+    #[error(transparent)]
+    Image(#[from] mateval_image::ImageError),
+}
+
+fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> SampleError {
+    let path = path.to_owned();
+    move |source| SampleError::Io { action, path, source }
+}
+
+pub(crate) fn create_folder(path: &Path) -> Result<(), SampleError> {
+    std::fs::create_dir_all(path).map_err(io("create", path))
+}
+
+/// Writes `text` to `path`, replacing a file of that name.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), SampleError> {
+    std::fs::write(path, text).map_err(io("write", path))
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -105,9 +130,9 @@ mod tests {
     use mateval_scene::Severity;
     use mateval_scene::material::{ConductorIor, MaterialModel};
     use mateval_scene::reference::Emission;
+    use mateval_sources::bitterli::{self, BitterliScene, Limits};
 
     use super::*;
-    use mateval_sources::bitterli::{self, BitterliScene, Limits};
 
     fn sample() -> BitterliScene {
         let folder = tempfile::tempdir().unwrap();
