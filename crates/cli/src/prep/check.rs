@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_audit::compare::{CompareOptions, compare, text};
+use mateval_audit::compare::{CompareOptions, compare, report};
 use mateval_audit::stats;
 use mateval_image::store::write_whole;
 use mateval_scene::work_folder::is_inside;
@@ -84,7 +84,7 @@ impl CompareArgs {
             .context("cannot compare the dataset's pictures")?;
         match self.format {
             Format::Json => print(&json::to_text(&file))?,
-            Format::Text => print(&text::text(&file))?,
+            Format::Text => print(&report::text(&file))?,
         }
         if let Some(out) = &self.out {
             say(&format!("{}: both pictures side by side", out.join("index.html").display()));
@@ -117,13 +117,13 @@ impl StatsArgs {
         let dataset = open_dataset(&self.dataset)?;
         let counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
         if let Some(picture) = &self.picture {
-            write_whole(picture, stats::picture::picture(&counted).as_bytes())?;
+            write_whole(picture, stats::show::picture(&counted).as_bytes())?;
         }
         match (self.format, &self.picture) {
             (Format::Json, _) => print(&json::to_text(&counted))?,
-            (Format::Text, None) => print(&stats::text::text(&counted))?,
+            (Format::Text, None) => print(&stats::show::text(&counted))?,
             (Format::Text, Some(picture)) => {
-                print(&format!("{}\n{}\n", stats::text::text(&counted), picture.display()))?
+                print(&format!("{}\n{}\n", stats::show::text(&counted), picture.display()))?
             }
         }
         Ok(Outcome::Good)

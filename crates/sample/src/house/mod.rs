@@ -103,7 +103,7 @@ const LEFT_OUT: f64 = 0.2;
 const KEPT: usize = 2;
 
 /// The id of the house with this number.
-pub(super) fn varied_uid(number: u32) -> String {
+fn varied_uid(number: u32) -> String {
     format!("cc000000-5a3b-4e00-8000-{:012}", u64::from(number) + 1_000_000)
 }
 
@@ -126,7 +126,7 @@ impl Draws {
 }
 
 /// Changes the built-in house into the one with this number. Houses of the same seed and number are equal.
-pub(super) fn vary(house: &mut Value, house_number: u32, seed: u64) {
+fn vary(house: &mut Value, house_number: u32, seed: u64) {
     let mut draws = Draws { seed: splitmix64::number(seed, u64::from(house_number)), next: 0 };
     house["uid"] = varied_uid(house_number).into();
     stretch(house, [1.0 + STRETCH * draws.share(), 1.0 + STRETCH * draws.share()]);
