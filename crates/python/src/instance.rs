@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::rows;
-use crate::failure::failed;
-use crate::scene_source::SceneSource;
+use crate::dataset::SceneSource;
+use crate::failed;
 
 /// One object that methods provide textures for.
 #[pyclass(frozen, module = "mateval")]
