@@ -24,10 +24,7 @@ use clap::{Parser, Subcommand};
 
 pub use fetch::{cache_folder, find_weights};
 use terminal::Outcome;
-pub use terminal::error_text;
-
-/// The name and version of this program, which datasets and results record, as in `mateval 0.1.0`.
-pub const TOOL: &str = concat!("mateval ", env!("CARGO_PKG_VERSION"));
+pub use terminal::{TOOL, error_text};
 
 /// Makes and scores a benchmark for recovering the materials of an indoor room from one photo.
 #[derive(Parser)]

@@ -10,6 +10,9 @@ use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use mateval_report::tables::wrapped;
 use mateval_scene::{Finding, Progress, Report, Severity};
 
+/// The name and version of this program, which datasets and results record, as in `mateval 0.1.0`.
+pub const TOOL: &str = concat!("mateval ", env!("CARGO_PKG_VERSION"));
+
 /// How a command that did its work ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {

@@ -14,8 +14,7 @@ use mateval_image::{Picture, exr_io, png_io};
 use mateval_scene::{Camera, Intrinsics, json};
 use serde::Serialize;
 
-use crate::ExportError;
-use crate::dataset::{ShownView, SoundDataset, copy_file, in_source, make_folder_of, write_file};
+use crate::dataset::{ExportError, ShownView, SoundDataset, copy_file, in_source, make_folder_of, write_file};
 
 /// The largest number of points of a scene.
 const MOST_POINTS: usize = 2000;

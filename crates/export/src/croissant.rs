@@ -12,9 +12,8 @@ use mateval_scene::{Progress, ViewId};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::dataset::{SoundDataset, licence_text, picture, slashed, write_file};
+use crate::dataset::{ExportError, Exported, SoundDataset, licence_text, picture, slashed, write_file};
 use crate::tars::{self, WrittenTar};
-use crate::{ExportError, Exported};
 
 /// The version of Croissant that the description follows.
 const CONFORMS_TO: &str = "http://mlcommons.org/croissant/1.1";

@@ -1,5 +1,5 @@
-//! What every format takes from a dataset: the files that its manifest lists, the views that have pictures, and the scenes'
-//! licences.
+//! What every format shares: the files that a dataset's manifest lists, the views that have pictures, the scenes' licences,
+//! and how an export ends.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,109 @@ use mateval_scene::manifest::{self, Entry, MISSING_FILE};
 use mateval_scene::open::{Dataset, is_below};
 use mateval_scene::{Camera, Finding, Progress, Report, SceneError, SceneId};
 
-use crate::{ExportError, Format};
+/// A format that a dataset can be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// One tar a scene and one for the rest, so that scenes can be downloaded on their own.
+    Tar,
+    /// The same tars with a description of them and of every view, in Croissant's JSON-LD.
+    Croissant,
+    /// A Parquet file with a row a view, and a dataset card.
+    Huggingface,
+    /// A folder a scene with `transforms.json`.
+    Nerfstudio,
+    /// A folder a scene with COLMAP's text model.
+    Colmap,
+}
+
+impl Format {
+    /// Whether the export is the whole dataset, so that no scene may be absent.
+    pub fn needs_all_scenes(self) -> bool {
+        matches!(self, Self::Tar | Self::Croissant | Self::Huggingface)
+    }
+
+    /// Whether the export shows the views' pictures, so that they must have been rendered.
+    pub fn needs_pictures(self) -> bool {
+        self != Self::Tar
+    }
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exported {
+    /// Number of scenes.
+    pub scenes: usize,
+    /// Number of views that are described; `None` for tars, which hold whole scenes.
+    pub views: Option<usize>,
+    /// Number of views that were left out, or described without a picture, because their pictures are withheld.
+    pub without_picture: usize,
+}
+
+/// Why a dataset could not be exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The output exists; what it holds is not looked into, so it is never replaced.
+    #[error("'{}' already exists; choose another --out, or remove it", path.display())]
+    Exists {
+        /// The output.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {action} '{}': {source}", path.display())]
+    Io {
+        /// What was attempted, as in "read" or "write".
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// The manifest lists hidden files, which are not exported, and without which the copy would not be the dataset.
+    #[error(
+        "'{}' lists {} hidden files ('{}' first), which are never exported: remove them and make the dataset again",
+        path.display(), files.len(), files[0]
+    )]
+    HiddenFiles {
+        /// The manifest.
+        path: PathBuf,
+        /// The files, relative to the dataset; at least one.
+        files: Vec<String>,
+    },
+    /// The dataset's pictures were not rendered.
+    #[error("'{}' has no pictures of all its views yet; run `mateval prep render DATASET`", path.display())]
+    NoPictures {
+        /// The dataset.
+        path: PathBuf,
+    },
+    /// The output would lie in the dataset.
+    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --out", path.display())]
+    OutputInDataset {
+        /// The output.
+        path: PathBuf,
+    },
+    /// The Parquet file could not be written.
+    #[error("cannot write '{}': {source}", path.display())]
+    Parquet {
+        /// The file.
+        path: PathBuf,
+        /// The writer's error.
+        source: parquet::errors::ParquetError,
+    },
+    /// The dataset is not valid, or lacks scenes that the format needs, or the output could not be written.
+    #[error(transparent)]
+    Dataset(#[from] mateval_scene::SceneError),
+    /// A picture could not be read or written.
+    #[error(transparent)]
+    Image(#[from] mateval_image::ImageError),
+}
+
+impl ExportError {
+    /// A constructor of [`ExportError::Io`] for `map_err`.
+    pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { action, path, source }
+    }
+}
 
 /// A dataset that may be exported.
 #[derive(Clone, Debug)]

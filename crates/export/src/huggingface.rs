@@ -19,8 +19,9 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 use serde_json::{Value, json};
 
-use crate::dataset::{SoundDataset, licence_text, make_folder_of, picture, write_file, write_licences};
-use crate::{ExportError, Exported};
+use crate::dataset::{
+    ExportError, Exported, SoundDataset, licence_text, make_folder_of, picture, write_file, write_licences,
+};
 
 /// The Parquet file; its name states the split, and that it is the only one.
 const VIEWS: &str = "data/test-00000-of-00001.parquet";

@@ -13,8 +13,7 @@ use mateval_scene::open::is_below;
 use mateval_scene::{Progress, Report};
 use sha2::{Digest as _, Sha256};
 
-use crate::dataset::{SoundDataset, make_folder_of, write_file, write_licences};
-use crate::{ExportError, Exported};
+use crate::dataset::{ExportError, Exported, SoundDataset, make_folder_of, write_file, write_licences};
 
 /// The tar with everything outside the scenes.
 pub const BASE: &str = "base.tar";

@@ -15,7 +15,7 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::failed;
+use crate::long_work::failed;
 
 /// Rows of pixels as an array of shape (height, width).
 pub fn plane<'py, T: Element + Copy>(py: Python<'py>, picture: &Picture<T>) -> PyResult<Bound<'py, PyArray2<T>>> {

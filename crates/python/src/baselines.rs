@@ -22,8 +22,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{MapInput, plane, triples};
-use crate::dataset::{Scene, SceneSource};
-use crate::failed;
+use crate::dataset::Scene;
+use crate::instance::SceneSource;
+use crate::long_work::failed;
 use crate::long_work::run_long;
 
 /// The maps of an instance, encoded as a submission stores them.

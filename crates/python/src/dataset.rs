@@ -2,19 +2,18 @@
 //! it a mapping.
 
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use anyhow::Context as _;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::{SceneError, TriangleMesh, open, plain_instances};
+use mateval_scene::layout::INPUT;
+use mateval_scene::open;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyIterator, PyList, PyType};
 
-use crate::instance::{Instance, Part};
+use crate::instance::{Instance, Part, SceneSource};
+use crate::long_work::{failed, unknown_id};
 use crate::view::View;
-use crate::{failed, unknown_id};
 
 /// A dataset on disk. Opening it checks its JSON files against its manifest; pictures are read when they are used.
 #[pyclass(frozen, subclass, mapping, module = "mateval._core")]
@@ -201,43 +200,4 @@ fn by_id<'a, T: pyo3::PyClass + Into<PyClassInitializer<T>>>(
     }
     let owner = format!("scene '{}'", scene.source.file().id);
     Ok(CLASS.import(py, "mateval.by_id", "ById")?.call1((owner, kind, all))?.unbind())
-}
-
-/// A scene and the dataset that it belongs to.
-pub struct SceneSource {
-    /// The dataset.
-    pub dataset: Arc<open::Dataset>,
-    /// The scene's place in the dataset.
-    at: usize,
-    /// The instances' meshes, once one of them was read.
-    meshes: OnceLock<Vec<Arc<TriangleMesh>>>,
-}
-
-impl SceneSource {
-    /// The scene at this place of the dataset, which must exist.
-    pub fn new(dataset: Arc<open::Dataset>, at: usize) -> Self {
-        Self { dataset, at, meshes: OnceLock::new() }
-    }
-
-    /// `scene.json`.
-    pub fn file(&self) -> &SceneFile {
-        &self.dataset.scenes[self.at]
-    }
-
-    /// Its folder.
-    pub fn folder(&self) -> SceneFolder {
-        self.dataset.folder(&self.file().id)
-    }
-
-    /// The mesh of an instance by its place in `scene.json`. The first call reads those of all instances.
-    pub fn mesh(&self, instance: usize) -> Result<Arc<TriangleMesh>, SceneError> {
-        if let Some(meshes) = self.meshes.get() {
-            return Ok(Arc::clone(&meshes[instance]));
-        }
-        // Reading fails where the file holds other instances than scene.json.
-        let surfaces = plain_instances::read(&self.folder(), self.file())?.surfaces;
-        let meshes: Vec<Arc<TriangleMesh>> = surfaces.into_iter().map(|surface| Arc::new(surface.mesh)).collect();
-        // Two threads may both read; no lock is held meanwhile, which a forked child could wait for.
-        Ok(Arc::clone(&self.meshes.get_or_init(|| meshes)[instance]))
-    }
 }

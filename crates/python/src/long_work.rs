@@ -1,4 +1,4 @@
-//! Runs long work so that Ctrl-C ends the call.
+//! Runs long work so that Ctrl-C ends the call, and turns errors into exceptions.
 //!
 //! Python's signal handlers run in its main thread, and only when that thread asks for them. The work therefore runs in
 //! the pool, which owns its inputs, while the calling thread waits and asks several times a second. After an interrupt
@@ -16,10 +16,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use mateval_scene::{Progress, Report};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-
-use crate::failed;
 
 /// How long signals may wait.
 const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
@@ -98,4 +99,30 @@ pub fn pool(_attached: Python<'_>) -> PyResult<Arc<ThreadPool>> {
 pub fn abandon_pool(_attached: Python<'_>) {
     let mut owned = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     owned.take_if(|owned| owned.process == std::process::id());
+}
+
+/// An exception of the package `mateval.errors`: `mateval.Error` with the text that the command prints after `error: `.
+pub fn failed(error: impl Into<anyhow::Error>) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "Error", mateval_cli::error_text(&error.into()))
+}
+
+/// `mateval.UnknownId`.
+pub fn unknown_id(message: String) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "UnknownId", message)
+}
+
+/// `mateval.Withheld`.
+pub fn withheld(message: String) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "Withheld", message)
+}
+
+fn exception(class: &'static PyOnceLock<Py<PyType>>, name: &str, message: String) -> PyErr {
+    Python::attach(|py| match class.import(py, "mateval.errors", name) {
+        Ok(class) => PyErr::from_type(class.clone(), message),
+        // The extension module was copied out of its package.
+        Err(_) => PyRuntimeError::new_err(message),
+    })
 }

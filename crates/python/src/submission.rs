@@ -18,7 +18,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{MapInput, Numbers};
 use crate::dataset::{Dataset, quoted, scene_place};
-use crate::{failed, unknown_id};
+use crate::long_work::{failed, unknown_id};
 
 /// Writes a submission. Its folder appears when the `with` block ends without an exception, or when `close` is called;
 /// until then it is hidden beside its place, and a failed or killed program leaves nothing at that place.

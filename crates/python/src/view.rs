@@ -16,8 +16,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{plane, read_picture, rows, triples};
-use crate::dataset::SceneSource;
-use crate::{failed, withheld};
+use crate::instance::SceneSource;
+use crate::long_work::{failed, withheld};
 
 /// A view of a scene. Its pictures are read from their files at each access.
 #[pyclass(frozen, module = "mateval")]

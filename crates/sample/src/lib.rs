@@ -14,9 +14,12 @@ pub mod pattern;
 mod room;
 pub mod solid;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_image::png_io::write_rgb_bytes;
+
+pub use house::files::SampleError;
+use house::files::{create_folder, write_text};
 
 /// The room's licence file: CC0 1.0.
 const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
@@ -91,36 +94,6 @@ fn write_room(out: &Path) -> Result<(), SampleError> {
     }
     write_text(&room.join("LICENSE.txt"), LICENSE)?;
     write_text(&room.join("scene.xml"), &room::xml())
-}
-
-/// Why the built-in scenes could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum SampleError {
-    /// An operation of the file system failed.
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// The operation, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    /// A picture could not be written.
-    #[error(transparent)]
-    Image(#[from] mateval_image::ImageError),
-}
-
-fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> SampleError {
-    let path = path.to_owned();
-    move |source| SampleError::Io { action, path, source }
-}
-
-pub(crate) fn create_folder(path: &Path) -> Result<(), SampleError> {
-    std::fs::create_dir_all(path).map_err(io("create", path))
-}
-
-/// Writes `text` to `path`, replacing a file of that name.
-pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), SampleError> {
-    std::fs::write(path, text).map_err(io("write", path))
 }
 
 #[cfg(test)]

@@ -260,6 +260,12 @@ impl State {
     }
 }
 
+/// A check of the file itself, which has no number.
+pub(super) fn file_check(picture: &str, state: State, message: String) -> Check {
+    let picture = picture.to_owned();
+    Check { picture, quantity: Quantity::File, state, measured: None, bound: None, count: 0, message }
+}
+
 impl std::fmt::Display for Check {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} {}: {}", self.picture, self.state.word(), self.message)

@@ -33,11 +33,11 @@ use mateval_tracer::World;
 
 use self::file::{
     BOUNDS, COMPARE_FORMAT, CompareFile, ComparedDataset, LAMBERT_TILE, LightComparison, MaterialKind, OTHER_TILE,
-    SceneComparison, SourceComparison, State, ViewComparison,
+    SceneComparison, SourceComparison, State, ViewComparison, file_check,
 };
 use self::geometry::{OurGeometry, TheirGeometry};
 use self::light::{Halves, ShownKinds};
-use self::pictures::{OurLight, PILOT, TheirView, file_check};
+use self::pictures::{OurLight, PILOT, TheirView};
 use self::report::ViewPreviews;
 use crate::AuditError;
 

@@ -14,7 +14,7 @@ use mateval_scene::{Camera, Progress, Report, SceneId, json};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 
-use super::file::{Check, Quantity, STANDARD_ERRORS, State};
+use super::file::{Check, STANDARD_ERRORS, State, file_check};
 use super::light::{Halves, ShownKinds, Tile, median};
 use crate::AuditError;
 
@@ -58,12 +58,6 @@ impl TheirView {
         let [a, b] = ["a", "b"].map(|half| self.linear(picture, &format!("{picture}_{half}.exr")));
         Ok(Halves { a: a?, b: b? })
     }
-}
-
-/// A check of the file itself, which has no number.
-pub(super) fn file_check(picture: &str, state: State, message: String) -> Check {
-    let picture = picture.to_owned();
-    Check { picture, quantity: Quantity::File, state, measured: None, bound: None, count: 0, message }
 }
 
 /// The built-in tracer's pictures of one view.

@@ -11,7 +11,7 @@ use mateval_image::{ImageError, LinearRgb, Picture, Texture};
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{Emission, LightGroup, ReferenceScene, Surface, SurfaceIndex};
 
-use super::element::{Element, Remarks};
+use super::files::{Element, Remarks};
 use super::materials::radiance_map;
 
 /// The emission of a surface.

@@ -10,7 +10,7 @@ use mateval_scene::material::{
     UvTransform,
 };
 
-use super::element::{Element, Remarks};
+use super::files::{Element, Remarks};
 
 /// The material as a plugin. `remarks` receives what Mitsuba cannot express.
 pub(super) fn bsdf(

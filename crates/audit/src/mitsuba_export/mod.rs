@@ -4,14 +4,13 @@
 //! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that Mitsuba cannot express.
 //! The scene contains the nearest that it can.
 //!
-//! Between: this file converts the camera, `ply` meshes, `materials` materials and their textures, and `lights` lights;
-//! `element` writes the XML. Names of the source appear in comments of the XML only, so that no
+//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights;
+//! `files` writes XML and meshes. Names of the source appear in comments of the XML only, so that no
 //! name can become a path or markup.
 
-mod element;
+mod files;
 mod lights;
 mod materials;
-mod ply;
 
 use std::path::{Path, PathBuf};
 
@@ -27,10 +26,10 @@ use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Camera, Finding, SceneId, ViewId, reference_io};
 use mateval_tracer::RenderSettings;
 
-use self::element::{Element, Remarks, SCENE_FILE};
+use self::files::Sheet;
+use self::files::{Element, Remarks, SCENE_FILE};
 use self::lights::Glow;
 use self::materials::TextureFiles;
-use self::ply::Sheet;
 use crate::AuditError;
 
 /// Distance of the second sheet of a lamp that emits on both sides behind the first, as a share of the mesh's extent.
@@ -163,7 +162,7 @@ fn write_surface(
         return Ok(Vec::new());
     }
     let place = format!("surface {index} '{}'", surface.name);
-    let bent = ply::bent_triangles(&surface.mesh);
+    let bent = files::bent_triangles(&surface.mesh);
     if bent > 0 && glow.is_none() {
         let message = format!("{bent} triangles have a vertex normal behind their front");
         remarks.note(
@@ -187,7 +186,7 @@ fn write_surface(
     }
     let mut shapes = Vec::new();
     for (file, sheet) in sheets {
-        let (bytes, normals) = ply::bytes(&surface.mesh, sheet);
+        let (bytes, normals) = files::ply_bytes(&surface.mesh, sheet);
         write_whole(&folder.join(&file), &bytes)?;
         let shape = Element::plugin("shape", "ply")
             .remark(&surface.name)

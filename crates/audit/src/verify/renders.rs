@@ -13,7 +13,7 @@ use mateval_scene::render_file::RenderFile;
 use mateval_scene::scorer_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_scene::{Finding, RendererId, Severity, json};
 
-use super::check_schema;
+use super::scene::check_schema;
 
 /// Radiance times exposure below which every channel of an 8-bit sRGB picture is 0: half a step of the linear part of the
 /// transfer curve.

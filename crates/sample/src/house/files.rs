@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 use mateval_image::png_io::write_rgba_bytes;
@@ -13,7 +13,6 @@ use super::layout::{ArchitectureMesh, Furniture, HEIGHT, House, Room, THICKNESS}
 use super::materials::{self, ArchitectureMaterial, Swatch};
 use super::models::Model;
 use crate::solid::Solid;
-use crate::{SampleError, create_folder, write_text};
 
 /// The id of the house: made up, shaped as the data's.
 pub const HOUSE_ID: &str = "cc000000-5a3b-4e00-8000-000000000001";
@@ -318,4 +317,34 @@ fn field_uvs(model: &Model) -> Vec<impl Fn(DVec2) -> DVec2 + use<>> {
         move |uv: DVec2| DVec2::from(corner) + (uv - low) / span * width
     };
     model.parts.iter().map(into_field).collect()
+}
+
+/// Why the built-in scenes could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SampleError {
+    /// An operation of the file system failed.
+    #[error("cannot {action} '{}': {source}", path.display())]
+    Io {
+        /// The operation, as in "read" or "write".
+        action: &'static str,
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    /// A picture could not be written.
+    #[error(transparent)]
+    Image(#[from] mateval_image::ImageError),
+}
+
+fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> SampleError {
+    let path = path.to_owned();
+    move |source| SampleError::Io { action, path, source }
+}
+
+pub(crate) fn create_folder(path: &Path) -> Result<(), SampleError> {
+    std::fs::create_dir_all(path).map_err(io("create", path))
+}
+
+/// Writes `text` to `path`, replacing a file of that name.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), SampleError> {
+    std::fs::write(path, text).map_err(io("write", path))
 }

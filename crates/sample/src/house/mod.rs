@@ -19,13 +19,11 @@ pub mod models;
 
 use std::path::Path;
 
-use files::{HOUSE_ID, number};
+use files::{HOUSE_ID, SampleError, create_folder, number, write_text};
 use layout::House;
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_scene::splitmix64;
 use serde_json::{Value, json};
-
-use crate::{SampleError, create_folder, write_text};
 
 /// The house's licence file: CC0 1.0.
 const LICENSE: &str = "This is 'The Sample House' by the MatEval authors, made by `mateval sample`: made up, in the layout\n\
