@@ -19,34 +19,23 @@ use mateval_scene::{SceneId, ViewId};
 /// Why a dataset could not be examined, exported or published.
 #[derive(Debug, thiserror::Error)]
 pub enum AuditError {
-    /// The file system refused.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
         /// What was attempted, as in "read" or "write".
         action: &'static str,
-        /// The file.
         path: PathBuf,
-        /// The system's error.
         source: std::io::Error,
     },
     /// The folder contains no finished dataset.
     #[error("'{}' has no dataset.json: it is not a dataset, or its build did not finish and `prep build` must be run again", path.display())]
-    NotADataset {
-        /// The folder.
-        path: PathBuf,
-    },
+    NotADataset { path: PathBuf },
     /// The dataset has no ground truth that could be withheld.
     #[error("'{}' has no ground truth to withhold", path.display())]
-    NoGroundTruth {
-        /// The dataset's folder.
-        path: PathBuf,
-    },
+    NoGroundTruth { path: PathBuf },
     /// The scene has no such view.
     #[error("'{}' has no view '{view}' of the scene '{scene}'", path.display())]
     NoView {
-        /// The dataset's folder.
         path: PathBuf,
-        /// The scene.
         scene: SceneId,
         /// The view that it does not have.
         view: ViewId,
@@ -56,21 +45,13 @@ pub enum AuditError {
         "'{}' has no pictures by {renderer} of scene {}; run `mateval prep render DATASET --renderer {renderer}`",
         path.display(), quoted(scenes)
     )]
-    NotRendered {
-        /// The dataset's folder.
-        path: PathBuf,
-        /// The renderer.
-        renderer: RendererKind,
-        /// The scenes.
-        scenes: Vec<SceneId>,
-    },
+    NotRendered { path: PathBuf, renderer: RendererKind, scenes: Vec<SceneId> },
     /// A view's pictures do not have the size of its camera's picture.
     #[error(
         "'{}' contains pictures that do not have the camera's {}x{} pixels; run `mateval prep verify`",
         path.display(), expected[0], expected[1]
     )]
     WrongSize {
-        /// The view's folder.
         path: PathBuf,
         /// Width and height of the camera's picture, in pixels.
         expected: [usize; 2],
@@ -78,7 +59,6 @@ pub enum AuditError {
     /// The pictures of one view under each light are larger than the memory reserved for them.
     #[error("scene '{scene}': the pictures of one view under {lights} lights take more than {most_bytes} bytes")]
     TooManyLights {
-        /// The scene.
         scene: SceneId,
         /// The number of its lights.
         lights: usize,
@@ -87,16 +67,10 @@ pub enum AuditError {
     },
     /// The output would lie in the dataset.
     #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --out", path.display())]
-    OutputInDataset {
-        /// The output.
-        path: PathBuf,
-    },
+    OutputInDataset { path: PathBuf },
     /// The output exists and is not a comparison.
     #[error("'{}' exists and is not a comparison; it is not replaced: choose another --out", path.display())]
-    NotAComparison {
-        /// The folder.
-        path: PathBuf,
-    },
+    NotAComparison { path: PathBuf },
     /// Pictures could not be rendered, or the recipe could not be read.
     #[error(transparent)]
     Prep(#[from] mateval_prep::PrepError),

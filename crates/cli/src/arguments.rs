@@ -70,7 +70,6 @@ pub struct ExportPlaces {
 }
 
 impl Places {
-    /// Opens the dataset.
     pub fn open(&self) -> anyhow::Result<Dataset> {
         open_dataset(&self.dataset)
     }
@@ -92,7 +91,6 @@ impl Places {
 }
 
 impl ExportPlaces {
-    /// Opens the dataset.
     pub fn open(&self) -> anyhow::Result<Dataset> {
         open_dataset(&self.dataset)
     }
@@ -114,7 +112,6 @@ pub struct EstimateArgs {
 }
 
 impl EstimateArgs {
-    /// Whether `--estimate` was given.
     pub fn is_given(&self) -> bool {
         self.estimate.is_some()
     }

@@ -97,7 +97,6 @@ pub struct MedianPartArgs {
     part_set: Option<PartSetId>,
 }
 
-/// Makes the submission.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Gt(places) => places.done(truth::write(&places.open()?, &places.out, places.force)?),
@@ -170,7 +169,6 @@ impl Lights {
 }
 
 impl DelightArgs {
-    /// Writes the pictures.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let dataset = self.places.open()?;
         let options = DelightOptions { lights: self.lights.candidates(), ..DelightOptions::default() };
@@ -312,7 +310,6 @@ pub struct TexgenImportArgs {
 }
 
 impl TexgenExportArgs {
-    /// Writes the objects.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let source = self.estimate.source(EstimateSource::Truth)?;
         let dataset = self.places.open()?;
@@ -349,7 +346,6 @@ pub struct PartfieldImportArgs {
     places: ExportPlaces,
 }
 
-/// Writes the meshes.
 fn partfield_export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
     let count = partfield::export(&places.open()?, &places.out)?;
     print(&format!("{}: {count} mesh{}\n", places.out.display(), if count == 1 { "" } else { "es" }))?;

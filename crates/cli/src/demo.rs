@@ -187,9 +187,7 @@ impl DemoArgs {
         close(&places, &options, &dataset, self.full)?;
         Ok(Outcome::Good)
     }
-}
 
-impl DemoArgs {
     fn baselines(&self) -> Vec<DemoBaseline> {
         use DemoBaseline::{Grey, Gt, Median, Nn, Procedural, ProceduralKeepSeen};
         match (self.baselines.is_empty(), self.full) {

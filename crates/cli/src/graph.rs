@@ -29,7 +29,6 @@ pub enum Command {
     Render(RenderArgs),
 }
 
-/// Runs the subcommand.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::List(args) => args.run(),
@@ -48,7 +47,6 @@ pub struct ListArgs {
 }
 
 impl ListArgs {
-    /// Prints the list.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         match &self.graph {
             None => print_graphs(self.format)?,

@@ -18,7 +18,6 @@ use crate::tars::{self, WrittenTar};
 /// The version of Croissant that the description follows.
 const CONFORMS_TO: &str = "http://mlcommons.org/croissant/1.1";
 
-/// The description.
 pub const CROISSANT: &str = "croissant.json";
 
 /// A line for each view.

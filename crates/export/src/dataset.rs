@@ -41,7 +41,6 @@ impl Format {
 /// What was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exported {
-    /// Number of scenes.
     pub scenes: usize,
     /// Number of views that are described; `None` for tars, which hold whole scenes.
     pub views: Option<usize>,
@@ -54,18 +53,12 @@ pub struct Exported {
 pub enum ExportError {
     /// The output exists; what it holds is not looked into, so it is never replaced.
     #[error("'{}' already exists; choose another --out, or remove it", path.display())]
-    Exists {
-        /// The output.
-        path: PathBuf,
-    },
-    /// The file system refused.
+    Exists { path: PathBuf },
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
         /// What was attempted, as in "read" or "write".
         action: &'static str,
-        /// The file.
         path: PathBuf,
-        /// The system's error.
         source: std::io::Error,
     },
     /// The manifest lists hidden files, which are not exported, and without which the copy would not be the dataset.
@@ -74,31 +67,19 @@ pub enum ExportError {
         path.display(), files.len(), files[0]
     )]
     HiddenFiles {
-        /// The manifest.
         path: PathBuf,
         /// The files, relative to the dataset; at least one.
         files: Vec<String>,
     },
     /// The dataset's pictures were not rendered.
     #[error("'{}' has no pictures of all its views yet; run `mateval prep render DATASET`", path.display())]
-    NoPictures {
-        /// The dataset.
-        path: PathBuf,
-    },
+    NoPictures { path: PathBuf },
     /// The output would lie in the dataset.
     #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --out", path.display())]
-    OutputInDataset {
-        /// The output.
-        path: PathBuf,
-    },
+    OutputInDataset { path: PathBuf },
     /// The Parquet file could not be written.
     #[error("cannot write '{}': {source}", path.display())]
-    Parquet {
-        /// The file.
-        path: PathBuf,
-        /// The writer's error.
-        source: parquet::errors::ParquetError,
-    },
+    Parquet { path: PathBuf, source: parquet::errors::ParquetError },
     /// The dataset is not valid, or lacks scenes that the format needs, or the output could not be written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
@@ -118,7 +99,6 @@ impl ExportError {
 /// A dataset that may be exported.
 #[derive(Clone, Debug)]
 pub struct SoundDataset {
-    /// The dataset.
     pub dataset: Dataset,
     /// The files that the manifest lists and that exist: all but those of absent scenes and of withheld ground truth.
     /// Sorted; none is hidden and none lies outside the dataset.
@@ -169,9 +149,7 @@ fn is_hidden(file: &str) -> bool {
 /// A view that has a picture.
 #[derive(Clone, Debug)]
 pub struct ShownView<'a> {
-    /// The scene.
     pub scene: &'a SceneFile,
-    /// The view.
     pub view: &'a View,
     /// Its 8-bit sRGB picture, relative to the dataset.
     pub picture: PathBuf,
@@ -226,13 +204,11 @@ pub fn write_licences(dataset: &Dataset, out: &Path) -> Result<(), ExportError> 
     dataset.file.scenes.iter().try_for_each(|scene| write_licence(dataset, scene, &place(scene)))
 }
 
-/// Writes `bytes` to `path`.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     make_folder_of(path)?;
     Ok(write_whole(path, bytes)?)
 }
 
-/// Copies a file.
 pub(crate) fn copy_file(from: &Path, to: &Path) -> Result<(), ExportError> {
     make_folder_of(to)?;
     std::fs::copy(from, to).map_err(ExportError::io("copy", from))?;

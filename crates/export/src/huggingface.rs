@@ -154,16 +154,12 @@ message views {
 }
 ";
 
-/// A row.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// The scene's id.
     pub scene: String,
-    /// The view's id.
     pub view: String,
     /// The bytes of its PNG file; none where it is withheld.
     pub picture: Option<Vec<u8>>,
-    /// Its camera.
     pub camera: Camera,
     /// The licence of its scene.
     pub licence: Option<String>,

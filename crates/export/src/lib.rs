@@ -23,11 +23,8 @@ use dataset::{ShownView, SoundDataset, shown_views, write_licence};
 /// What to export, and where to.
 #[derive(Clone, Debug)]
 pub struct ExportOptions {
-    /// The dataset's folder.
     pub dataset: PathBuf,
-    /// The format.
     pub format: Format,
-    /// The folder to write.
     pub out: PathBuf,
     /// Facts that the dataset does not hold and a description may state.
     pub publication: croissant::Publication,

@@ -28,7 +28,6 @@ pub struct WrittenTar {
     pub name: String,
     /// SHA-256 of its bytes, hex.
     pub sha256: String,
-    /// Its size in bytes.
     pub bytes: u64,
 }
 

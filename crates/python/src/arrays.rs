@@ -75,7 +75,6 @@ pub enum Numbers {
 pub struct MapInput {
     name: &'static str,
     shape: Vec<usize>,
-    /// Its numbers.
     pub numbers: Numbers,
 }
 
@@ -207,7 +206,6 @@ impl MapInput {
 pub enum ColoursOrNumbers {
     /// As the metrics take colours: sRGB-encoded.
     Colours(Picture<SrgbRgb>),
-    /// Numbers.
     Numbers(Picture<f32>),
 }
 

@@ -190,7 +190,6 @@ impl Mesh {
 
 /// A scene and the dataset that it belongs to.
 pub struct SceneSource {
-    /// The dataset.
     pub dataset: Arc<open::Dataset>,
     /// The scene's place in the dataset.
     at: usize,
@@ -209,7 +208,6 @@ impl SceneSource {
         &self.dataset.scenes[self.at]
     }
 
-    /// Its folder.
     pub fn folder(&self) -> SceneFolder {
         self.dataset.folder(&self.file().id)
     }

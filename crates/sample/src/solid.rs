@@ -159,7 +159,6 @@ pub(crate) mod tile {
     pub(crate) const PLANKS: f64 = 1.2;
     /// Wood of furniture.
     pub(crate) const WOOD: f64 = 0.8;
-    /// The wallpaper.
     pub(crate) const WALLPAPER: f64 = 0.5;
     /// The sofa's fabric.
     pub(crate) const FABRIC: f64 = 0.3;
@@ -195,7 +194,6 @@ pub(super) fn sofa() -> Solid {
         .boxed(v(-0.67, 0.1, -0.3), v(0.67, 0.27, 0.34), tile::FABRIC)
 }
 
-/// The sofa's four feet.
 pub(super) fn sofa_feet() -> Solid {
     [(-0.76, -0.32), (0.76, -0.32), (0.76, 0.32), (-0.76, 0.32)].into_iter().fold(Solid::default(), |feet, (x, z)| {
         feet.turned(v(x, 0.0, z), &[(0.0, 0.0), (0.02, 0.0), (0.028, 0.1)], 12, tile::PLAIN)

@@ -121,7 +121,5 @@ pub mod kept_folder {
 }
 #[doc(hidden)]
 pub mod synthetic_noise {
-    pub use crate::statistics::{
-        Render, SCATTERS, Scatter, mean_and_deviation, mean_of, single_pixels, squares, waves,
-    };
+    pub use crate::statistics::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
 }

@@ -103,7 +103,6 @@ impl Builder {
         self
     }
 
-    /// Adds a light.
     pub fn light(mut self, emission: Emission) -> Self {
         self.0.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
         self
@@ -136,7 +135,6 @@ pub fn camera(position: [f64; 3], target: [f64; 3], size: u32, fov_deg: f64) -> 
 /// The four walls among the room's surfaces; added meshes come after them.
 pub const WALLS: [usize; 4] = [2, 3, 4, 5];
 
-/// A parallelogram.
 pub fn box_quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
     let (corner, u, v) = (Vec3::from(corner), Vec3::from(u), Vec3::from(v));
     TriangleMesh {

@@ -12,9 +12,7 @@ pub struct Renders(Vec<Picture<LinearRgb>>);
 /// A mean with its standard error.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
-    /// The mean.
     pub mean: f64,
-    /// Its standard error.
     pub error: f64,
 }
 
@@ -65,7 +63,6 @@ impl Renders {
         Self(self.0.iter().map(|picture| picture.map(|pixel| LinearRgb(pixel.0.map(|v| factor * v)))).collect())
     }
 
-    /// The individual renders.
     pub fn pictures(&self) -> &[Picture<LinearRgb>] {
         &self.0
     }
@@ -85,7 +82,6 @@ impl Renders {
         self.region(0..self.0[0].width(), 0..self.0[0].height())
     }
 
-    /// The mean picture.
     pub fn picture(&self) -> Picture<LinearRgb> {
         let n = self.0.len() as f32;
         Picture::from_fn(self.0[0].width(), self.0[0].height(), |x, y| {
@@ -109,7 +105,6 @@ pub enum Scatter {
     HeavyTailed,
 }
 
-/// Both distributions.
 pub const SCATTERS: [Scatter; 2] = [Scatter::GaussianLike, Scatter::HeavyTailed];
 
 /// How a picture is rendered.
@@ -119,7 +114,6 @@ pub struct Render<'a> {
     pub scatter: Scatter,
     /// The share of each sample that scatters.
     pub strength: f64,
-    /// Samples a pixel.
     pub samples: u32,
     /// If given, three of four samples are shared by all pixels of a block, in all views.
     pub blocks: Option<&'a Picture<u32>>,
@@ -161,14 +155,6 @@ fn hash(state: u64, word: u64) -> u64 {
     number(mixed.wrapping_sub(INCREMENT), 0)
 }
 
-/// The mean of two halves.
-pub fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    Picture::from_fn(a.width(), a.height(), |x, y| {
-        let (a, b) = (a.get(x, y).0, b.get(x, y).0);
-        LinearRgb(std::array::from_fn(|c| 0.5 * (a[c] + b[c])))
-    })
-}
-
 /// A picture with gradients and waves, `side` pixels square, values of 0.05 to 0.95.
 pub fn waves(side: usize) -> Picture<LinearRgb> {
     Picture::from_fn(side, side, |x, y| {
@@ -177,17 +163,6 @@ pub fn waves(side: usize) -> Picture<LinearRgb> {
     })
 }
 
-/// Squares of four pixels, each a block; `first` is the first's id.
-pub fn squares(side: usize, first: u32) -> Picture<u32> {
-    Picture::from_fn(side, side, |x, y| first + (y / 4 * side.div_ceil(4) + x / 4) as u32)
-}
-
-/// Blocks of one pixel each.
-pub fn single_pixels(side: usize) -> Picture<u32> {
-    Picture::from_fn(side, side, |x, y| (y * side + x) as u32)
-}
-
-/// Mean and standard deviation.
 pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;

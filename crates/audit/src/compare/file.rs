@@ -361,7 +361,6 @@ pub struct Bounds {
     pub group_sum: f64,
 }
 
-/// The bounds in force.
 pub const BOUNDS: Bounds = Bounds {
     base_color_psnr_db: BASE_COLOR_PSNR_DB,
     equal_id_share: EQUAL_ID_SHARE,

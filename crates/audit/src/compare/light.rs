@@ -271,7 +271,6 @@ pub(super) struct Halves {
     pub(super) b: Picture<LinearRgb>,
 }
 
-/// A rectangle of pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Tile {
     pub(super) columns: Range<usize>,
@@ -283,7 +282,6 @@ pub(super) struct Tile {
 pub(super) struct Difference {
     /// The difference of the means.
     pub(super) mean: [f64; 3],
-    /// Their standard errors.
     pub(super) error: [f64; 3],
 }
 

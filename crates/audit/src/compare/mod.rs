@@ -44,7 +44,6 @@ use crate::AuditError;
 /// What to compare, and where to write the page.
 #[derive(Clone, Debug, Default)]
 pub struct CompareOptions {
-    /// The dataset's folder.
     pub dataset: PathBuf,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,

@@ -260,14 +260,12 @@ const APART: [u8; 3] = [150, 150, 150];
 /// The previews of a view.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ViewPreviews {
-    /// Folder of the page.
     #[serde(skip)]
     out: PathBuf,
     /// Folder of the pictures, relative to the page.
     folder: String,
     #[serde(skip)]
     exposure: f64,
-    /// The view.
     pub(super) view: String,
     /// One row per picture.
     rows: Vec<Row>,

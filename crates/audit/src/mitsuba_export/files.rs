@@ -6,7 +6,6 @@ use std::fmt::Write as _;
 use glam::Vec3;
 use mateval_scene::{Finding, Severity, TriangleMesh};
 
-/// An XML element.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {
     tag: &'static str,
@@ -17,7 +16,6 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// An element without attributes.
     pub(super) fn new(tag: &'static str) -> Self {
         Self { tag, attributes: Vec::new(), children: Vec::new(), remark: None }
     }
@@ -123,7 +121,6 @@ fn escaped(value: &str) -> String {
 /// The name of the exported scene's file, which all findings refer to.
 pub(super) const SCENE_FILE: &str = "scene.xml";
 
-/// The findings so far.
 #[derive(Default)]
 pub(super) struct Remarks(Vec<Finding>);
 

@@ -170,7 +170,6 @@ fn conductor_ior(bsdf: Element, ior: &ConductorIor) -> Element {
 
 /// The textures of a scene. Each is written to disk when it is first used.
 pub(super) struct TextureFiles<'a> {
-    /// The scene's folder.
     folder: &'a Path,
     textures: &'a [Texture],
     /// The file of each texture and channel that was written; the channel is none for colours.

@@ -40,13 +40,10 @@ const SHEET_DISTANCE: f32 = 1e-4;
 pub struct ExportOptions {
     /// The dataset's folder, which must contain the ground truth.
     pub dataset: PathBuf,
-    /// The scene.
     pub scene: SceneId,
-    /// The view.
     pub view: ViewId,
     /// Samples per pixel; the recipe's number where absent.
     pub samples: Option<u32>,
-    /// The folder to write.
     pub out: PathBuf,
     /// Replace a folder that already exists.
     pub force: bool,

@@ -114,7 +114,6 @@ pub struct ExplainArgs {
 }
 
 impl ExplainArgs {
-    /// Explains the scene's errors.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         self.out.iter().try_for_each(|out| explain::check_out(out, self.force))?;
         let result = ResultFile::read(&self.result)?;

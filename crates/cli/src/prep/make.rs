@@ -113,9 +113,7 @@ impl SurveyArgs {
             force: self.force,
         })
     }
-}
 
-impl SurveyArgs {
     /// Surveys the houses; the answer is no where no room qualifies, or fewer than the scenes that are wanted.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let options = self.checked()?;
@@ -135,7 +133,6 @@ impl SurveyArgs {
     }
 }
 
-/// Reports a finished survey.
 fn report(args: &SurveyArgs, file: &SurveyFile, source: &Path) -> anyhow::Result<Outcome> {
     for error in file.houses.iter().filter_map(|house| house.error.as_ref()) {
         say(&format!("left out: {error}"));
@@ -433,7 +430,6 @@ pub struct FinishArgs {
 }
 
 impl FinishArgs {
-    /// Finishes the dataset.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let finish = |progress: mateval_scene::Progress<'_>| {
             mateval_prep::finish::finish(&self.dataset, &self.without, TOOL, progress)

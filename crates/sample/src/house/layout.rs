@@ -37,7 +37,6 @@ pub struct Room {
 
 /// A record of the `furniture` list, and where its model is placed.
 pub struct Furniture {
-    /// The record's id.
     pub uid: &'static str,
     /// The name of its model.
     pub model: &'static str,

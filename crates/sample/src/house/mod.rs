@@ -34,7 +34,6 @@ attribution.\n\n\
 For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
-/// The built-in house.
 pub fn built_in() -> House {
     House {
         rooms: vec![layout::living_room(), layout::bedroom()],

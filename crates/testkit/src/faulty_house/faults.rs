@@ -13,12 +13,10 @@ use serde_json::{Value, json};
 /// The location of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// In the house's JSON.
     Json {
         /// JSON pointer (RFC 6901).
         pointer: &'static str,
     },
-    /// In a file.
     File {
         /// Path relative to the house's folder.
         path: &'static str,

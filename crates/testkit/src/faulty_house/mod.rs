@@ -356,7 +356,6 @@ mod tests {
     use super::faults::{FAULTS, Place};
     use super::*;
 
-    /// The house's JSON.
     struct Layout(Value);
 
     impl Layout {
@@ -374,7 +373,6 @@ mod tests {
         }
     }
 
-    /// The house as files.
     struct Files(tempfile::TempDir);
 
     impl Files {
