@@ -16,6 +16,9 @@ use mateval_metrics::{Lpips, Net};
 
 use crate::terminal::{Outcome, error_text, print, say};
 
+/// The command that downloads missing weights.
+pub const FETCH_LPIPS: &str = "mateval fetch lpips";
+
 const LPIPS: &str = include_str!("fetch/lpips_weights.py");
 const BLENDER: &str = include_str!("fetch/blender_module.py");
 /// The module that both scripts import.
@@ -130,9 +133,6 @@ fn run_script(python: &Path, script: &str, words: &[OsString], without: &str) ->
         (false, None) => bail!("'{shown}' failed without a message ({})", ended.status),
     }
 }
-
-/// The command that downloads missing weights.
-pub const FETCH_LPIPS: &str = "mateval fetch lpips";
 
 /// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`.
 pub fn cache_folder() -> PathBuf {

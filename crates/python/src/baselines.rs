@@ -24,8 +24,7 @@ use pyo3::types::PyDict;
 use crate::arrays::{MapInput, plane, triples};
 use crate::dataset::Scene;
 use crate::instance::SceneSource;
-use crate::long_work::failed;
-use crate::long_work::run_long;
+use crate::long_work::{failed, run_long};
 
 /// The maps of an instance, encoded as a submission stores them.
 #[pyclass(frozen, get_all, module = "mateval")]

@@ -19,8 +19,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{ColoursOrNumbers, MapInput, mask_of};
 use crate::dataset::{Dataset, scene_place};
-use crate::long_work::failed;
-use crate::long_work::run_long;
+use crate::long_work::{failed, run_long};
 
 /// Checks a submission, a folder or an archive. Returns the report as JSON, and as text for people.
 #[pyfunction]

@@ -8,10 +8,9 @@ use std::ops::Range;
 
 use mateval_image::{LinearRgb, Mask, Picture};
 
-use super::file::file_check;
 use super::file::{
     Check, FALSE_ALARM, GROUP_SUM, LightComparison, MaterialKind, MeanDifference, NOISE_OVER_BOUND, PICTURE_MEAN,
-    Quantity, STANDARD_ERRORS, State, TILE_SHARE_OVER, TilesApart, TilesCompared, WorstTile,
+    Quantity, STANDARD_ERRORS, State, TILE_SHARE_OVER, TilesApart, TilesCompared, WorstTile, file_check,
 };
 
 /// The tiles of a view with the kinds of material that they show, and the pixels that count.

@@ -110,11 +110,8 @@ pub(super) fn render_ours(
 fn light_of(view: &ViewLight) -> OurLight {
     let [a, b] = [0, 1].map(|half| &view.halves[half].basis);
     let groups = a.pictures().iter().zip(b.pictures());
-    OurLight { rgb: Halves { a: a.sum(), b: b.sum() }, groups: groups.map(|(a, b)| halves(a, b)).collect() }
-}
-
-fn halves(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Halves {
-    Halves { a: a.clone(), b: b.clone() }
+    let groups = groups.map(|(a, b)| Halves { a: a.clone(), b: b.clone() }).collect();
+    OurLight { rgb: Halves { a: a.sum(), b: b.sum() }, groups }
 }
 
 /// Samples per pixel of each half of the pilot, and the least number that is chosen.

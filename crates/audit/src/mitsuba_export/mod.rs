@@ -4,9 +4,8 @@
 //! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that Mitsuba cannot express.
 //! The scene contains the nearest that it can.
 //!
-//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights;
-//! `files` writes XML and meshes. Names of the source appear in comments of the XML only, so that no
-//! name can become a path or markup.
+//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights; `files` writes XML
+//! and meshes. Names of the source appear in comments of the XML only, so that no name can become a path or markup.
 
 mod files;
 mod lights;
@@ -26,8 +25,7 @@ use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Camera, Finding, SceneId, ViewId, reference_io};
 use mateval_tracer::RenderSettings;
 
-use self::files::Sheet;
-use self::files::{Element, Remarks, SCENE_FILE};
+use self::files::{Element, Remarks, SCENE_FILE, Sheet};
 use self::lights::Glow;
 use self::materials::TextureFiles;
 use crate::AuditError;
