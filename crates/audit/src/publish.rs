@@ -12,7 +12,7 @@ use mateval_scene::open::check_whole;
 use mateval_scene::work_folder::{WorkFolder, check_holds_none};
 use mateval_scene::{Progress, Report, SceneError, json};
 
-use crate::error::AuditError;
+use crate::AuditError;
 
 /// The result of publishing a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,32 +1,28 @@
 //! `mateval baseline`: makes a submission by a method that comes with the tool, or from another method's files.
 
-mod delight;
 mod encoding;
-mod estimate;
 mod import;
-mod partfield;
-mod places;
-mod procedural;
-mod relight;
-mod texgen;
 
 use std::num::NonZero;
+use std::path::PathBuf;
+use std::str::FromStr;
 
-use anyhow::bail;
-use clap::Subcommand;
+use anyhow::{Context as _, bail};
+use clap::ValueEnum;
+use mateval_baselines::delight::relight::{self, Dimmed, RelightOptions};
+use mateval_baselines::delight::{self, CandidateLights, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
+use mateval_baselines::procedural::{self, FitMode, ProceduralOptions, report_folder};
 use mateval_baselines::seen_cloud::FillRule;
-use mateval_baselines::{grey, homogeneous, truth};
+use mateval_baselines::{grey, homogeneous, partfield, texgen, truth};
 use mateval_scene::PartSetId;
 
-use self::estimate::EstimateArgs;
-use self::places::{ExportPlaces, Places};
-use crate::bars::with_progress;
-use crate::outcome::Outcome;
+use crate::arguments::{EstimateArgs, ExportPlaces, Places};
+use crate::terminal::{Outcome, counted, print, with_progress};
 
 /// Subcommands of `baseline`, one per method.
-#[derive(Subcommand)]
+#[derive(clap::Subcommand)]
 pub enum Command {
     /// Ceiling: the true materials, baked to the dataset's own atlases.
     Gt(Places),
@@ -39,28 +35,27 @@ pub enum Command {
     /// One colour per part: the median of an estimate inside the part's mask.
     MedianPart(MedianPartArgs),
     /// A procedural graph per part, fitted to an estimate: patterns continue where the input view shows nothing.
-    Procedural(procedural::ProceduralArgs),
+    Procedural(ProceduralArgs),
     /// Takes the light out of every photo: base colour from photo and geometry alone, as pictures that other baselines
     /// accept as an estimate.
-    Delight(delight::DelightArgs),
+    Delight(DelightArgs),
     /// Lights the rooms of de-lit photos anew: a page with a slider for each of the strongest lights.
-    Relight(relight::RelightArgs),
+    Relight(RelightArgs),
     /// Compares a method's pictures with the truth and reports which encoding their numbers fit; exit code 1 if it is
     /// not the adapter's.
     Encoding(encoding::EncodingArgs),
     /// Transfers a method's own textured meshes, or one material per part, to the dataset's atlases.
     Import(import::ImportArgs),
     /// Writes seen instances as TEXGen reads objects: mesh, partial atlas, masks, positions and picture of each.
-    TexgenExport(texgen::TexgenExportArgs),
+    TexgenExport(TexgenExportArgs),
     /// Makes a submission of TEXGen's textures: seen texels from the estimate, all others from TEXGen.
-    TexgenImport(texgen::TexgenImportArgs),
+    TexgenImport(TexgenImportArgs),
     /// Writes every instance as a mesh that PartField reads.
     PartfieldExport(ExportPlaces),
     /// Copies PartField's labels to where `part_labels` in a recipe expects them: one folder per scene.
-    PartfieldImport(partfield::PartfieldImportArgs),
+    PartfieldImport(PartfieldImportArgs),
 }
 
-/// Arguments of `nn`.
 #[derive(clap::Args)]
 pub struct NnArgs {
     #[command(flatten)]
@@ -83,7 +78,6 @@ pub struct NnArgs {
     atlas_size: Option<u32>,
 }
 
-/// Arguments of `median`.
 #[derive(clap::Args)]
 pub struct MedianArgs {
     #[command(flatten)]
@@ -92,7 +86,6 @@ pub struct MedianArgs {
     estimate: EstimateArgs,
 }
 
-/// Arguments of `median-part`.
 #[derive(clap::Args)]
 pub struct MedianPartArgs {
     #[command(flatten)]
@@ -104,7 +97,6 @@ pub struct MedianPartArgs {
     part_set: Option<PartSetId>,
 }
 
-/// Makes the submission.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Gt(places) => places.done(truth::write(&places.open()?, &places.out, places.force)?),
@@ -125,15 +117,15 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
                 homogeneous::write_by_part(&dataset, &places.out, places.force, &source, set, progress)
             })?)
         }
-        Command::Procedural(args) => procedural::run(args),
-        Command::Delight(args) => delight::run(args),
-        Command::Relight(args) => relight::run(args),
-        Command::Encoding(args) => encoding::run(args),
-        Command::Import(args) => import::run(args),
-        Command::TexgenExport(args) => texgen::export(args),
-        Command::TexgenImport(args) => texgen::import(args),
-        Command::PartfieldExport(places) => partfield::export(places),
-        Command::PartfieldImport(args) => partfield::import(args),
+        Command::Procedural(args) => args.run(),
+        Command::Delight(args) => args.run(),
+        Command::Relight(args) => args.run(),
+        Command::Encoding(args) => args.run(),
+        Command::Import(args) => args.run(),
+        Command::TexgenExport(args) => args.run(),
+        Command::TexgenImport(args) => args.run(),
+        Command::PartfieldExport(places) => partfield_export(places),
+        Command::PartfieldImport(args) => args.run(),
     }
 }
 
@@ -146,4 +138,225 @@ fn nearest_neighbours(args: &NnArgs) -> anyhow::Result<Outcome> {
     let options = NnOptions { rule, any_instance: args.any_instance, atlas_size: args.atlas_size };
     let dataset = places.open_for(&source)?;
     places.done(with_progress(|progress| nn::write(&dataset, &places.out, places.force, &source, &options, progress))?)
+}
+
+#[derive(clap::Args)]
+pub struct DelightArgs {
+    #[command(flatten)]
+    places: ExportPlaces,
+    /// Which lights may shine.
+    #[arg(long, value_enum, default_value_t = Lights::Room)]
+    lights: Lights,
+}
+
+/// Which lights may shine while a photo is de-lit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Lights {
+    /// Light fixtures, ceilings, what is seen to glow, the world around, and the lights of a stage.
+    Room,
+    /// The lights of a stage alone, as in PSDR-Room.
+    Stage,
+}
+
+impl Lights {
+    /// The same as an option of the baseline.
+    pub fn candidates(self) -> CandidateLights {
+        match self {
+            Self::Room => CandidateLights::Room,
+            Self::Stage => CandidateLights::Stage,
+        }
+    }
+}
+
+impl DelightArgs {
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let dataset = self.places.open()?;
+        let options = DelightOptions { lights: self.lights.candidates(), ..DelightOptions::default() };
+        let out = &self.places.out;
+        let count = with_progress(|progress| delight::write(&dataset, out, &options, progress))?;
+        let shown = out.display();
+        let scenes = counted(count, "scene");
+        print(&format!(
+            "'{shown}': {scenes}; open '{shown}/index.html'; use them with --estimate '{shown}' --adapter delight\n"
+        ))?;
+        Ok(Outcome::Good)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct ProceduralArgs {
+    #[command(flatten)]
+    places: Places,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+    /// Which lights may shine while the photo is de-lit; for --estimate delight [default: room].
+    #[arg(long, value_enum)]
+    lights: Option<Lights>,
+    /// The part set, such as `partfield` [default: the parts of the source].
+    #[arg(long)]
+    part_set: Option<PartSetId>,
+    /// How graphs are chosen.
+    #[arg(long, value_enum, default_value_t = Mode::Best)]
+    mode: Mode,
+    /// Keep the estimate in texels that the input view shows, and let graphs fill only the others.
+    #[arg(long)]
+    keep_seen: bool,
+    /// How much of a pattern's randomness is kept, 0 to 1: with 1 it looks most alike, with 0 it has the least error.
+    #[arg(long, default_value_t = 1.0, value_name = "SHARE", allow_negative_numbers = true)]
+    detail: f64,
+    /// A folder of .mtlx files that are fitted beside the built-in graphs.
+    #[arg(long, value_name = "FOLDER")]
+    graphs: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Mode {
+    /// Orientation and sizes in closed form; a graph is taken if held-out pixels speak for it.
+    Best,
+    /// In the way of PSDR-Room, for comparison: a grid of turns and scales, then gradient descent.
+    Paper,
+}
+
+impl ProceduralArgs {
+    /// Writes the submission and its report.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let default = EstimateSource::Delight(Lights::Room.candidates());
+        let source = match (self.estimate.source(default)?, self.lights) {
+            (EstimateSource::Delight(_), Some(lights)) => EstimateSource::Delight(lights.candidates()),
+            (source, None) => source,
+            (_, Some(_)) => bail!("--lights is for --estimate delight alone; other estimates are not lit"),
+        };
+        let options = ProceduralOptions {
+            part_set: self.part_set.clone(),
+            mode: match self.mode {
+                Mode::Best => FitMode::Best,
+                Mode::Paper => FitMode::Paper,
+            },
+            keep_seen: self.keep_seen,
+            detail: self.detail,
+            graphs: self.graphs.clone(),
+        };
+        let (places, dataset) = (&self.places, self.places.open()?);
+        let instances = with_progress(|progress| {
+            procedural::write(&dataset, &places.out, places.force, &source, &options, progress)
+        })?;
+        print(&format!("report: {}\n", report_folder(&places.out).join("index.html").display()))?;
+        places.done(instances)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct RelightArgs {
+    /// The output of `mateval baseline delight`.
+    pictures: PathBuf,
+    #[command(flatten)]
+    places: ExportPlaces,
+    /// Multiply the radiance of a light of `lights.json`, such as lamp=0 or world=2; may be repeated. Other lights stay
+    /// as they were fitted.
+    #[arg(long = "light", value_name = "NAME=FACTOR")]
+    lights: Vec<LightFactor>,
+    /// Paths per pixel.
+    #[arg(long, default_value_t = RelightOptions::default().samples, value_parser = clap::value_parser!(u32).range(2..=65_536))]
+    samples: u32,
+}
+
+/// A light and the factor of its radiance.
+#[derive(Clone)]
+struct LightFactor(Dimmed);
+
+impl FromStr for LightFactor {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> anyhow::Result<Self> {
+        let (name, factor) = text.rsplit_once('=').context("expected NAME=FACTOR")?;
+        let factor: f64 = factor.parse().with_context(|| format!("'{factor}' is not a number"))?;
+        if !(0.0..=1e6).contains(&factor) {
+            bail!("factor {factor}: expected 0 to 1e6");
+        }
+        Ok(Self(Dimmed { name: name.to_owned(), factor }))
+    }
+}
+
+impl RelightArgs {
+    /// Writes the pictures and the page.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let dataset = self.places.open()?;
+        let dimmed = self.lights.iter().map(|LightFactor(dimmed)| dimmed.clone()).collect();
+        let options = RelightOptions { dimmed, samples: self.samples };
+        let out = &self.places.out;
+        let count = with_progress(|progress| relight::write(&dataset, &self.pictures, out, &options, progress))?;
+        let scenes = counted(count, "scene");
+        print(&format!("'{}': {scenes}; open '{}'\n", out.display(), out.join("index.html").display()))?;
+        Ok(Outcome::Good)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct TexgenExportArgs {
+    #[command(flatten)]
+    places: ExportPlaces,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+}
+
+#[derive(clap::Args)]
+pub struct TexgenImportArgs {
+    /// Folder of TEXGen's textures, one `<id>.png` per object.
+    results: PathBuf,
+    #[command(flatten)]
+    places: Places,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+}
+
+impl TexgenExportArgs {
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let source = self.estimate.source(EstimateSource::Truth)?;
+        let dataset = self.places.open()?;
+        let count = with_progress(|progress| texgen::export(&dataset, &self.places.out, &source, progress))?;
+        print(&format!("{}: {count} objects\n", self.places.out.display()))?;
+        Ok(Outcome::Good)
+    }
+}
+
+impl TexgenImportArgs {
+    /// Makes a submission of TEXGen's textures.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        if !self.estimate.is_given() {
+            bail!("texgen-import needs --estimate, the same as texgen-export had: seen texels are taken from it");
+        }
+        let (places, source) = (&self.places, self.estimate.source(EstimateSource::Truth)?);
+        let dataset = places.open()?;
+        let found = with_progress(|progress| {
+            texgen::import(&dataset, &self.results, &places.out, places.force, &source, progress)
+        })?;
+        print(&format!("{}: {} textures found\n", self.results.display(), found.textured))?;
+        places.done(found.instances)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct PartfieldImportArgs {
+    /// PartField's folder `cluster_out`, with files `<id>_0_<parts>.npy`.
+    clusters: PathBuf,
+    /// Number of parts that an instance is split into.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=64))]
+    parts: u8,
+    #[command(flatten)]
+    places: ExportPlaces,
+}
+
+fn partfield_export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
+    let count = partfield::export(&places.open()?, &places.out)?;
+    print(&format!("{}: {count} mesh{}\n", places.out.display(), if count == 1 { "" } else { "es" }))?;
+    Ok(Outcome::Good)
+}
+
+impl PartfieldImportArgs {
+    /// Copies the labels to where a recipe expects them.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let count = partfield::import(&self.places.open()?, &self.clusters, self.parts, &self.places.out)?;
+        print(&format!("{}: labels of {}\n", self.places.out.display(), counted(count, "instance")))?;
+        Ok(Outcome::Good)
+    }
 }

@@ -1,6 +1,6 @@
-//! `mateval demo`: every step from the built-in sample to a leaderboard.
+//! `mateval demo`: every step from the built-in sample to a leaderboard; and `mateval sample`, which writes that sample.
 //!
-//! Every step keeps the finished files in the demo's folder. So a demo that failed or was killed resumes when it is run
+//! Every step of the demo keeps the finished files in the demo's folder. So a demo that failed or was killed resumes when it is run
 //! again with the same options, and a finished one shows its table again.
 
 use std::io::IsTerminal as _;
@@ -8,8 +8,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, bail};
-use serde::{Deserialize, Serialize};
-
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::delight::{self, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
@@ -31,13 +29,12 @@ use mateval_report::strips::Shown;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables, wrapped};
 use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, Severity, json, work_folder};
+use serde::{Deserialize, Serialize};
 
-use crate::bars::with_progress;
-use crate::outcome::{Outcome, counted, error_text, print, say};
-use crate::prep::blender::BlenderArgs;
-use crate::prep::render::{checked_renderer, renderer_parser, samples_parser};
-use crate::tool::TOOL;
-use crate::weights;
+use crate::TOOL;
+use crate::fetch::{cache_folder, load_weights};
+use crate::prep::make::{BlenderArgs, checked_renderer, renderer_parser, samples_parser};
+use crate::terminal::{Outcome, counted, error_text, print, say, with_progress};
 
 /// The protocol whose numbers are printed.
 const PROTOCOL: &str = "mateval-3";
@@ -74,9 +71,8 @@ impl DemoBaseline {
     }
 }
 
-/// Arguments of `demo`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct DemoArgs {
     /// Folder for everything that the demo makes. A demo that was interrupted there resumes.
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
@@ -160,38 +156,38 @@ impl Places {
     }
 }
 
-/// Runs the steps one after the other and prints the results.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let places = Places::of(&args.out);
-    let lpips = weights::load(Net::Alex);
-    let earlier = earlier_options(&places)?;
-    let (kind, renderer) = choose_renderer(args, earlier.as_ref())?;
-    let options = Options {
-        tool: TOOL.to_owned(),
-        renderer: kind,
-        samples: args.samples.unwrap_or(if args.full { 64 } else { 24 }),
-        resolution: if args.full { LARGE } else { SMALL },
-        baselines: args.baselines(),
-        lpips: matches!(lpips, LpipsWeights::Loaded(_)),
-    };
-    begin(&places, earlier.as_ref(), &options, args.force)?;
-    json::write(&places.options, &options).context("cannot begin the demo")?;
+impl DemoArgs {
+    /// Runs the steps one after the other and prints the results.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let places = Places::of(&self.out);
+        let lpips = load_weights(Net::Alex);
+        let earlier = earlier_options(&places)?;
+        let (kind, renderer) = choose_renderer(self, earlier.as_ref())?;
+        let options = Options {
+            tool: TOOL.to_owned(),
+            renderer: kind,
+            samples: self.samples.unwrap_or(if self.full { 64 } else { 24 }),
+            resolution: if self.full { LARGE } else { SMALL },
+            baselines: self.baselines(),
+            lpips: matches!(lpips, LpipsWeights::Loaded(_)),
+        };
+        begin(&places, earlier.as_ref(), &options, self.force)?;
+        json::write(&places.options, &options).context("cannot begin the demo")?;
 
-    step(1, "sample", || {
-        mateval_sample::write_at(&places.source, options.resolution).context("cannot write the sample")?;
-        Ok("2 source scenes, a house and a room, and their recipe".to_owned())
-    })?;
-    step(2, "prep build", || build_dataset(&places))?;
-    step(3, "prep render", || render_dataset(&places, &options, renderer))?;
-    let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
-    step(4, "baseline", || make_submissions(&places, &options, &dataset))?;
-    step(5, "eval score", || score_submissions(&places, &options, &dataset, lpips))?;
-    step(6, "leaderboard", || write_leaderboard(&places, &options, &dataset))?;
-    close(&places, &options, &dataset, args.full)?;
-    Ok(Outcome::Good)
-}
+        step(1, "sample", || {
+            mateval_sample::write_at(&places.source, options.resolution).context("cannot write the sample")?;
+            Ok("2 source scenes, a house and a room, and their recipe".to_owned())
+        })?;
+        step(2, "prep build", || build_dataset(&places))?;
+        step(3, "prep render", || render_dataset(&places, &options, renderer))?;
+        let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
+        step(4, "baseline", || make_submissions(&places, &options, &dataset))?;
+        step(5, "eval score", || score_submissions(&places, &options, &dataset, lpips))?;
+        step(6, "leaderboard", || write_leaderboard(&places, &options, &dataset))?;
+        close(&places, &options, &dataset, self.full)?;
+        Ok(Outcome::Good)
+    }
 
-impl Args {
     fn baselines(&self) -> Vec<DemoBaseline> {
         use DemoBaseline::{Grey, Gt, Median, Nn, Procedural, ProceduralKeepSeen};
         match (self.baselines.is_empty(), self.full) {
@@ -219,7 +215,7 @@ fn earlier_options(places: &Places) -> anyhow::Result<Option<Options>> {
 
 /// The named renderer, else that of an earlier demo in this folder, else Blender if it can be used, else the built-in one.
 /// A Blender that the user names must be usable.
-fn choose_renderer(args: &Args, earlier: Option<&Options>) -> anyhow::Result<(RendererKind, Renderer)> {
+fn choose_renderer(args: &DemoArgs, earlier: Option<&Options>) -> anyhow::Result<(RendererKind, Renderer)> {
     let earlier = earlier.filter(|_| !args.force);
     if let Some(kind) = args.renderer.or_else(|| earlier.map(|options| options.renderer)) {
         return Ok((kind, checked_renderer(kind, &args.blender)?));
@@ -298,7 +294,7 @@ fn build_dataset(places: &Places) -> anyhow::Result<String> {
         scenes: Vec::new(),
         force: false,
         blender: None,
-        atlas_cache: Some(weights::cache_folder().join("atlases")),
+        atlas_cache: Some(cache_folder().join("atlases")),
     };
     let report = with_progress(|progress| build(&options, TOOL, progress)).context("cannot build the dataset")?;
     for (scene, findings) in &report.findings {
@@ -504,6 +500,38 @@ fn quoted(path: &Path) -> String {
     match text.chars().all(is_plain) && !text.starts_with('-') {
         true => text,
         false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
+#[derive(clap::Args)]
+pub struct SampleArgs {
+    /// Folder that the sample is written to.
+    out: PathBuf,
+    /// Write into a folder that already exists and replace files of the same name.
+    #[arg(long)]
+    force: bool,
+    /// Write this many houses made of the built-in one instead, with a recipe of one scene a house: a rehearsal of a
+    /// release at full size.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    houses: Option<u32>,
+    /// With --houses: what the houses are drawn from.
+    #[arg(long, requires = "houses", default_value_t = 0)]
+    seed: u64,
+}
+
+impl SampleArgs {
+    /// Writes the sample and prints the path of its recipe.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        if self.out.exists() && !self.force {
+            bail!("'{}' already exists; choose another folder, or add --force to write into it", self.out.display());
+        }
+        match self.houses {
+            None => mateval_sample::write(&self.out),
+            Some(count) => mateval_sample::write_houses(&self.out, count, self.seed),
+        }
+        .context("cannot write the sample")?;
+        print(&format!("{}\n", self.out.join("recipe.toml").display()))?;
+        Ok(Outcome::Good)
     }
 }
 

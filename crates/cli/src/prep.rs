@@ -1,64 +1,192 @@
-//! `mateval prep`: makes, checks and describes datasets.
+//! `mateval prep`: makes, checks and describes datasets. The commands that examine a dataset are here, those that make one in
+//! `make`, those that pass it on in `publish`.
 
-pub mod blender;
-pub mod build;
-mod compare;
-mod export;
-mod finish;
-mod mitsuba;
-mod perturb;
+pub mod make;
 mod publish;
-pub mod render;
-mod stats;
-mod survey;
-mod verify;
 
-use crate::outcome::Outcome;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+use mateval_audit::compare::{CompareOptions, compare, report};
+use mateval_audit::stats;
+use mateval_image::store::write_whole;
+use mateval_scene::work_folder::is_inside;
+use mateval_scene::{SceneId, Severity, json};
+
+use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, samples_parser};
+use self::publish::{ExportArgs, MitsubaArgs, PublishArgs};
+use crate::TOOL;
+use crate::arguments::{Format, check_output_file, open_dataset};
+use crate::terminal::{Outcome, print, say, with_progress};
 
 /// Subcommands of `prep`.
 #[derive(clap::Subcommand)]
 pub enum Command {
     /// Converts the scenes that a recipe lists into a dataset. A build that was killed resumes when it is run again.
-    Build(build::BuildArgs),
+    Build(BuildArgs),
     /// Searches 3D-FRONT houses for rooms that could become scenes, and writes a page to choose from and a recipe.
-    Survey(survey::SurveyArgs),
+    Survey(SurveyArgs),
     /// Renders the photos that methods see, and the reference with which scores under light compare. Changes the manifest: run
     /// it before the dataset is given to anyone.
-    Render(render::RenderArgs),
+    Render(RenderArgs),
     /// Writes the files that describe the whole dataset, after scenes were made or rendered apart by --scene.
-    Finish(finish::FinishArgs),
+    Finish(FinishArgs),
     /// Compares Blender's pictures with those of the built-in path tracer, and keeps the verdict in the dataset's compare.json,
     /// which its identity does not cover. Exit code 1: they disagree.
-    Compare(compare::CompareArgs),
+    Compare(CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
-    Verify(verify::VerifyArgs),
+    Verify(VerifyArgs),
     /// Copies what methods see of a dataset with furniture moved, scaled or bent, to measure what imperfect geometry
     /// costs.
-    Perturb(perturb::PerturbArgs),
+    Perturb(PerturbArgs),
     /// Splits a dataset into the public files and the ground truth of a hidden split, and writes a page that describes the
     /// release. Exit code 1: the page states a fault.
-    Publish(publish::PublishArgs),
+    Publish(PublishArgs),
     /// Writes a dataset in a format that other tools read: tars, Croissant, Hugging Face, nerfstudio or COLMAP.
-    Export(export::ExportArgs),
+    Export(ExportArgs),
     /// Counts what a dataset holds: the paper's Table I, objects by category, and numbers scene by scene.
-    Stats(stats::StatsArgs),
+    Stats(StatsArgs),
     /// Writes a view with its ground truth as a scene for Mitsuba 3. Exit code 1: Mitsuba cannot express all of it.
-    Mitsuba(mitsuba::MitsubaArgs),
+    Mitsuba(MitsubaArgs),
 }
 
-/// Runs the subcommand.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Build(args) => build::run(args),
-        Command::Survey(args) => survey::run(args),
-        Command::Render(args) => render::run(args),
-        Command::Finish(args) => finish::run(args),
-        Command::Compare(args) => compare::run(args),
-        Command::Verify(args) => verify::run(args),
-        Command::Perturb(args) => perturb::run(args),
-        Command::Publish(args) => publish::run(args),
-        Command::Export(args) => export::run(args),
-        Command::Stats(args) => stats::run(args),
-        Command::Mitsuba(args) => mitsuba::run(args),
+        Command::Build(args) => args.run(),
+        Command::Survey(args) => args.run(),
+        Command::Render(args) => args.run(),
+        Command::Finish(args) => args.run(),
+        Command::Compare(args) => args.run(),
+        Command::Verify(args) => args.run(),
+        Command::Perturb(args) => args.run(),
+        Command::Publish(args) => args.run(),
+        Command::Export(args) => args.run(),
+        Command::Stats(args) => args.run(),
+        Command::Mitsuba(args) => args.run(),
     }
+}
+
+#[derive(clap::Args)]
+pub struct VerifyArgs {
+    /// Folder of the dataset.
+    dataset: PathBuf,
+    /// How to print the findings.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+}
+
+impl VerifyArgs {
+    /// Checks the dataset and prints all findings.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let findings = with_progress(|progress| mateval_audit::verify::verify(&self.dataset, progress))
+            .with_context(|| format!("cannot verify '{}'", self.dataset.display()))?;
+        let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
+        match self.format {
+            Format::Json => print(&json::to_text(&serde_json::json!({
+                "format": "mateval-verify/1",
+                "tool": TOOL,
+                "sound": errors == 0,
+                "findings": findings,
+            })))?,
+            Format::Text => {
+                for finding in &findings {
+                    print(&format!("{finding}\n"))?;
+                }
+                let verdict = if errors == 0 { "sound" } else { "NOT sound" };
+                print(&format!("{}: {verdict}, {errors} errors\n", self.dataset.display()))?;
+            }
+        }
+        Ok(if errors == 0 { Outcome::Good } else { Outcome::No })
+    }
+}
+
+#[derive(clap::Args)]
+pub struct CompareArgs {
+    /// Folder of the dataset.
+    dataset: PathBuf,
+    /// Compare this scene only; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
+    scenes: Vec<SceneId>,
+    /// Samples per pixel of each half of the built-in tracer's pictures [default: as few as leave the
+    /// decision to Blender's noise or to the bound, and at most as many as Blender's].
+    #[arg(long, value_parser = samples_parser())]
+    samples: Option<u32>,
+    /// How to print the comparison.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// Folder for compare.json and a page that shows both pictures side by side.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Replace a comparison that already exists.
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+impl CompareArgs {
+    /// Compares and prints the checks.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let options = CompareOptions {
+            dataset: self.dataset.clone(),
+            scenes: self.scenes.clone(),
+            samples: self.samples,
+            out: self.out.clone(),
+            force: self.force,
+        };
+        let file = with_progress(|progress| compare(&options, TOOL, progress))
+            .context("cannot compare the dataset's pictures")?;
+        match self.format {
+            Format::Json => print(&json::to_text(&file))?,
+            Format::Text => print(&report::text(&file))?,
+        }
+        if let Some(out) = &self.out {
+            say(&format!("{}: both pictures side by side", out.join("index.html").display()));
+        }
+        Ok(if file.agrees { Outcome::Good } else { Outcome::No })
+    }
+}
+
+#[derive(clap::Args)]
+pub struct StatsArgs {
+    /// Folder of the dataset.
+    dataset: PathBuf,
+    /// How to print the counts.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// SVG file for a chart of the counts; must lie outside the dataset.
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<PathBuf>,
+    /// Replace a chart that already exists.
+    #[arg(long, requires = "picture")]
+    force: bool,
+}
+
+impl StatsArgs {
+    /// Counts, draws the chart where one is asked for, and prints the counts.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        if let Some(picture) = &self.picture {
+            check_picture(picture, &self.dataset, self.force)?;
+        }
+        let dataset = open_dataset(&self.dataset)?;
+        let counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
+        if let Some(picture) = &self.picture {
+            write_whole(picture, stats::show::picture(&counted).as_bytes())?;
+        }
+        match (self.format, &self.picture) {
+            (Format::Json, _) => print(&json::to_text(&counted))?,
+            (Format::Text, None) => print(&stats::show::text(&counted))?,
+            (Format::Text, Some(picture)) => {
+                print(&format!("{}\n{}\n", stats::show::text(&counted), picture.display()))?
+            }
+        }
+        Ok(Outcome::Good)
+    }
+}
+
+/// The dataset's manifest would not list a chart in its folder, so there must be none.
+fn check_picture(picture: &Path, dataset: &Path, force: bool) -> anyhow::Result<()> {
+    if is_inside(picture, dataset) {
+        let shown = picture.display();
+        bail!("'{shown}' would lie in the dataset, whose manifest does not list it; choose another --picture");
+    }
+    check_output_file(picture, "--picture", "picture", force)
 }

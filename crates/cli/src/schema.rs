@@ -15,22 +15,20 @@ use mateval_release::ReleaseFile;
 use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::errata::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
-use mateval_scene::compare_file;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
-use mateval_scene::json;
 use mateval_scene::material_class::MaterialClassesFile;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile, SourceMaterialsFile};
 use mateval_scene::render_file::RenderFile;
 use mateval_scene::scorer_file::ScorerFile;
 use mateval_scene::submission::SubmissionFile;
+use mateval_scene::{compare_file, json};
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
 
-use crate::outcome::{Outcome, print};
+use crate::terminal::{Outcome, print};
 
-/// Arguments of `schema`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct SchemaArgs {
     /// Folder that the schemas are written to, such as `dataset_spec/schema`.
     out: PathBuf,
     /// Replace schemas that already exist.
@@ -38,18 +36,20 @@ pub struct Args {
     force: bool,
 }
 
-/// Writes `NAME.schema.json` for every kind of JSON file.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let schemas = schemas().map(|(name, schema)| (args.out.join(name).with_extension("schema.json"), schema));
-    if let Some((path, _)) = schemas.iter().find(|(path, _)| path.exists() && !args.force) {
-        bail!("'{}' already exists; choose another folder, or add --force to overwrite it", path.display());
+impl SchemaArgs {
+    /// Writes `NAME.schema.json` for every kind of JSON file.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let schemas = schemas().map(|(name, schema)| (self.out.join(name).with_extension("schema.json"), schema));
+        if let Some((path, _)) = schemas.iter().find(|(path, _)| path.exists() && !self.force) {
+            bail!("'{}' already exists; choose another folder, or add --force to overwrite it", path.display());
+        }
+        std::fs::create_dir_all(&self.out).with_context(|| format!("cannot create '{}'", self.out.display()))?;
+        for (path, schema) in &schemas {
+            json::write(path, schema)?;
+            print(&format!("{}\n", path.display()))?;
+        }
+        Ok(Outcome::Good)
     }
-    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot create '{}'", args.out.display()))?;
-    for (path, schema) in &schemas {
-        json::write(path, schema)?;
-        print(&format!("{}\n", path.display()))?;
-    }
-    Ok(Outcome::Good)
 }
 
 fn schemas() -> [(&'static str, Schema); 26] {

@@ -12,18 +12,12 @@ use mateval_scene::{Progress, ViewId};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::error::ExportError;
-use crate::exported::Exported;
-use crate::shown_view::slashed;
-use crate::sound_dataset::SoundDataset;
+use crate::dataset::{ExportError, Exported, SoundDataset, licence_text, picture, slashed, write_file};
 use crate::tars::{self, WrittenTar};
-use crate::write_file::write_file;
-use crate::{licences, shown_view};
 
 /// The version of Croissant that the description follows.
 const CONFORMS_TO: &str = "http://mlcommons.org/croissant/1.1";
 
-/// The description.
 pub const CROISSANT: &str = "croissant.json";
 
 /// A line for each view.
@@ -71,7 +65,7 @@ pub fn export(
     let mut exported = Exported { scenes: sound.dataset.scenes.len(), views: Some(0), without_picture: 0 };
     let mut lines = String::new();
     for scene in &sound.dataset.scenes {
-        let licence = licences::text(&sound.dataset, &scene.id);
+        let licence = licence_text(&sound.dataset, &scene.id);
         for view in &scene.views {
             let line = line(sound, scene, view, licence.clone());
             exported.views = exported.views.map(|sum| sum + 1);
@@ -91,7 +85,7 @@ fn line<'a>(sound: &SoundDataset, scene: &'a SceneFile, view: &'a View, licence:
     Line {
         scene: scene.id.as_str(),
         view: view.id.as_str(),
-        picture_path: shown_view::picture(&sound.dataset, scene, view).map(|path| slashed(&path)),
+        picture_path: picture(&sound.dataset, scene, view).map(|path| slashed(&path)),
         width: k.width,
         height: k.height,
         fx: k.fx,

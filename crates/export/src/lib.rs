@@ -2,42 +2,29 @@
 //!
 //! In: a dataset whose files are those that its manifest lists. Out: a folder in one of five formats ([`Format`]).
 //!
-//! [`export`] opens and checks the dataset ([`sound_dataset`]), lists its views with their pictures ([`shown_view`]) and
-//! licences ([`licences`]), and passes them to the format's own file: [`mod@tars`], [`croissant`] (which describes those
-//! tars), [`huggingface`] (whose rows [`views_parquet`] writes), [`nerfstudio`] and [`colmap`].
+//! [`export`] opens and checks the dataset, lists its views with their pictures and licences ([`dataset`]), and passes
+//! them to the format's own file: [`mod@tars`], [`croissant`] (which describes those tars), [`huggingface`], or
+//! [`cameras`] (COLMAP and nerfstudio).
 
-pub mod colmap;
+pub mod cameras;
 pub mod croissant;
-pub mod error;
-pub mod exported;
-pub mod format;
+pub mod dataset;
 pub mod huggingface;
-pub mod licences;
-pub mod nerfstudio;
-pub mod shown_view;
-pub mod sound_dataset;
 pub mod tars;
-pub mod views_parquet;
-mod write_file;
 
 use std::path::{Path, PathBuf};
 
 use mateval_scene::work_folder::{WorkFolder, is_inside};
 use mateval_scene::{Progress, Report};
 
-pub use error::ExportError;
-pub use exported::Exported;
-pub use format::Format;
-use sound_dataset::SoundDataset;
+pub use dataset::{ExportError, Exported, Format};
+use dataset::{ShownView, SoundDataset, shown_views, write_licence};
 
 /// What to export, and where to.
 #[derive(Clone, Debug)]
 pub struct ExportOptions {
-    /// The dataset's folder.
     pub dataset: PathBuf,
-    /// The format.
     pub format: Format,
-    /// The folder to write.
     pub out: PathBuf,
     /// Facts that the dataset does not hold and a description may state.
     pub publication: croissant::Publication,
@@ -59,8 +46,8 @@ pub fn export(options: &ExportOptions, progress: Progress<'_>) -> Result<Exporte
         Format::Tar => tars::export(&sound, work.path(), progress)?,
         Format::Croissant => croissant::export(&sound, &options.publication, work.path(), progress)?,
         Format::Huggingface => huggingface::export(&sound, work.path(), progress)?,
-        Format::Nerfstudio => scene_by_scene(&sound, work.path(), progress, nerfstudio::write_scene)?,
-        Format::Colmap => scene_by_scene(&sound, work.path(), progress, colmap::write_scene)?,
+        Format::Nerfstudio => scene_by_scene(&sound, work.path(), progress, cameras::write_nerfstudio)?,
+        Format::Colmap => scene_by_scene(&sound, work.path(), progress, cameras::write_colmap)?,
     };
     work.finish()?;
     Ok(exported)
@@ -71,18 +58,18 @@ fn scene_by_scene(
     sound: &SoundDataset,
     out: &Path,
     progress: Progress<'_>,
-    write: impl Fn(&SoundDataset, &[shown_view::ShownView<'_>], &Path) -> Result<(), ExportError>,
+    write: impl Fn(&SoundDataset, &[ShownView<'_>], &Path) -> Result<(), ExportError>,
 ) -> Result<Exported, ExportError> {
     let scenes = &sound.dataset.scenes;
     let mut exported = Exported { scenes: scenes.len(), views: Some(0), without_picture: 0 };
     for (at, scene) in scenes.iter().enumerate() {
         progress(Report::part(&format!("scene {}", scene.id), at, scenes.len()));
-        let views = shown_view::of_scene(&sound.dataset, scene);
+        let views = shown_views(&sound.dataset, scene);
         exported.without_picture += scene.views.len() - views.len();
         exported.views = exported.views.map(|sum| sum + views.len());
         let folder = out.join(scene.id.as_str());
         write(sound, &views, &folder)?;
-        licences::write_one(&sound.dataset, &scene.id, &folder.join("LICENCE.txt"))?;
+        write_licence(&sound.dataset, &scene.id, &folder.join("LICENCE.txt"))?;
     }
     Ok(exported)
 }

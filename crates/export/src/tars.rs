@@ -13,11 +13,7 @@ use mateval_scene::open::is_below;
 use mateval_scene::{Progress, Report};
 use sha2::{Digest as _, Sha256};
 
-use crate::error::ExportError;
-use crate::exported::Exported;
-use crate::licences;
-use crate::sound_dataset::SoundDataset;
-use crate::write_file::{make_folder_of, write_file};
+use crate::dataset::{ExportError, Exported, SoundDataset, make_folder_of, write_file, write_licences};
 
 /// The tar with everything outside the scenes.
 pub const BASE: &str = "base.tar";
@@ -32,7 +28,6 @@ pub struct WrittenTar {
     pub name: String,
     /// SHA-256 of its bytes, hex.
     pub sha256: String,
-    /// Its size in bytes.
     pub bytes: u64,
 }
 
@@ -58,7 +53,7 @@ pub fn write(sound: &SoundDataset, out: &Path, progress: Progress<'_>) -> Result
     }
     let list: String = tars.iter().map(|tar| format!("{}  {}\n", tar.sha256, tar.name)).collect();
     write_file(&out.join(TARS), list.as_bytes())?;
-    licences::write_all(&sound.dataset, out)?;
+    write_licences(&sound.dataset, out)?;
     Ok(tars)
 }
 

@@ -1,15 +1,16 @@
-//! An instance, its parts and its mesh.
+//! An instance, its parts and its mesh; and the scene that all Python objects made from it share, which keeps the meshes.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use mateval_scene::{Role, TriangleMesh, dataset};
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::{Role, SceneError, TriangleMesh, dataset, open, plain_instances};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::rows;
-use crate::failure::failed;
-use crate::scene_source::SceneSource;
+use crate::long_work::failed;
 
 /// One object that methods provide textures for.
 #[pyclass(frozen, module = "mateval")]
@@ -184,5 +185,42 @@ impl Mesh {
 
     fn __repr__(&self) -> String {
         format!("<mateval.Mesh {} vertices, {} triangles>", self.0.positions.len(), self.0.triangles.len())
+    }
+}
+
+/// A scene and the dataset that it belongs to.
+pub struct SceneSource {
+    pub dataset: Arc<open::Dataset>,
+    /// The scene's place in the dataset.
+    at: usize,
+    /// The instances' meshes, once one of them was read.
+    meshes: OnceLock<Vec<Arc<TriangleMesh>>>,
+}
+
+impl SceneSource {
+    /// The scene at this place of the dataset, which must exist.
+    pub fn new(dataset: Arc<open::Dataset>, at: usize) -> Self {
+        Self { dataset, at, meshes: OnceLock::new() }
+    }
+
+    /// `scene.json`.
+    pub fn file(&self) -> &SceneFile {
+        &self.dataset.scenes[self.at]
+    }
+
+    pub fn folder(&self) -> SceneFolder {
+        self.dataset.folder(&self.file().id)
+    }
+
+    /// The mesh of an instance by its place in `scene.json`. The first call reads those of all instances.
+    pub fn mesh(&self, instance: usize) -> Result<Arc<TriangleMesh>, SceneError> {
+        if let Some(meshes) = self.meshes.get() {
+            return Ok(Arc::clone(&meshes[instance]));
+        }
+        // Reading fails where the file holds other instances than scene.json.
+        let surfaces = plain_instances::read(&self.folder(), self.file())?.surfaces;
+        let meshes: Vec<Arc<TriangleMesh>> = surfaces.into_iter().map(|surface| Arc::new(surface.mesh)).collect();
+        // Two threads may both read; no lock is held meanwhile, which a forked child could wait for.
+        Ok(Arc::clone(&self.meshes.get_or_init(|| meshes)[instance]))
     }
 }

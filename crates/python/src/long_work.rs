@@ -1,20 +1,26 @@
-//! Runs long work so that Ctrl-C ends the call.
+//! Runs long work so that Ctrl-C ends the call, and turns errors into exceptions.
 //!
 //! Python's signal handlers run in its main thread, and only when that thread asks for them. The work therefore runs in
 //! the pool, which owns its inputs, while the calling thread waits and asks several times a second. After an interrupt
 //! the call returns at once. The work itself ends at its next report of progress, by unwinding; until then it takes
 //! processor time, but nobody sees its result, and later calls have other threads.
+//!
+//! There is one pool for each process. `fork` copies the memory of a pool but none of its threads, so a child that used its parent's pool would wait for ever.
+//! PyTorch's data loaders fork. Each process therefore gets its own pool when it first needs one, and the global pool of
+//! rayon is never used.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use mateval_scene::{Progress, Report};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-
-use crate::pool::{abandon_pool, pool};
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// How long signals may wait.
 const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
@@ -61,4 +67,62 @@ pub fn run_long<T: Send + 'static>(
             Err(RecvTimeoutError::Disconnected) => unreachable!("the work always sends a result"),
         }
     }
+}
+
+/// Several calls may wait on one thread, each below the other on its stack.
+const STACK_BYTES: usize = 32 << 20;
+
+struct OwnedPool {
+    process: u32,
+    pool: Arc<ThreadPool>,
+}
+
+static POOL: Mutex<Option<OwnedPool>> = Mutex::new(None);
+
+/// This process's pool. Only threads that are attached to Python take the lock, and so is the thread that calls `fork`:
+/// in the child the lock is free.
+pub fn pool(_attached: Python<'_>) -> PyResult<Arc<ThreadPool>> {
+    let mut owned = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if let Some(owned) = owned.as_ref().filter(|owned| owned.process == process) {
+        return Ok(Arc::clone(&owned.pool));
+    }
+    let pool = Arc::new(ThreadPoolBuilder::new().stack_size(STACK_BYTES).build().map_err(failed)?);
+    let parents = owned.replace(OwnedPool { process, pool: Arc::clone(&pool) });
+    // Dropping the parent's pool would wake threads that do not exist here.
+    std::mem::forget(parents);
+    Ok(pool)
+}
+
+/// Lets the threads of this process end with their work; the next call gets new ones. Work that nobody wants any more
+/// would keep them from later calls.
+pub fn abandon_pool(_attached: Python<'_>) {
+    let mut owned = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    owned.take_if(|owned| owned.process == std::process::id());
+}
+
+/// An exception of the package `mateval.errors`: `mateval.Error` with the text that the command prints after `error: `.
+pub fn failed(error: impl Into<anyhow::Error>) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "Error", mateval_cli::error_text(&error.into()))
+}
+
+/// `mateval.UnknownId`.
+pub fn unknown_id(message: String) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "UnknownId", message)
+}
+
+/// `mateval.Withheld`.
+pub fn withheld(message: String) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "Withheld", message)
+}
+
+fn exception(class: &'static PyOnceLock<Py<PyType>>, name: &str, message: String) -> PyErr {
+    Python::attach(|py| match class.import(py, "mateval.errors", name) {
+        Ok(class) => PyErr::from_type(class.clone(), message),
+        // The extension module was copied out of its package.
+        Err(_) => PyRuntimeError::new_err(message),
+    })
 }

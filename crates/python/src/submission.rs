@@ -16,9 +16,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::{MapInput, Numbers};
 use crate::dataset::{Dataset, quoted, scene_place};
-use crate::failure::{failed, unknown_id};
-use crate::map_input::{MapInput, Numbers};
+use crate::long_work::{failed, unknown_id};
 
 /// Writes a submission. Its folder appears when the `with` block ends without an exception, or when `close` is called;
 /// until then it is hidden beside its place, and a failed or killed program leaves nothing at that place.

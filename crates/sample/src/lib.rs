@@ -6,11 +6,9 @@
 //!
 //! The bytes are the same on every machine.
 //!
-//! `solid` builds meshes, `furniture` combines them into objects, `pattern` paints the textures, and `room` places the
-//! objects and writes the XML. `house` uses the first three.
+//! `solid` builds meshes and combines them into furniture, `pattern` paints the textures, and `room` places the furniture
+//! and writes the XML. `house` also uses the first two.
 
-mod files;
-pub mod furniture;
 pub mod house;
 pub mod pattern;
 mod room;
@@ -20,8 +18,8 @@ use std::path::Path;
 
 use mateval_image::png_io::write_rgb_bytes;
 
-pub use files::SampleError;
-use files::{create_folder, write_text};
+pub use house::files::SampleError;
+use house::files::{create_folder, write_text};
 
 /// The room's licence file: CC0 1.0.
 const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
@@ -105,9 +103,9 @@ mod tests {
     use mateval_scene::Severity;
     use mateval_scene::material::{ConductorIor, MaterialModel};
     use mateval_scene::reference::Emission;
+    use mateval_sources::bitterli::{self, BitterliScene, Limits};
 
     use super::*;
-    use mateval_sources::bitterli::{self, BitterliScene, Limits};
 
     fn sample() -> BitterliScene {
         let folder = tempfile::tempdir().unwrap();

@@ -7,8 +7,7 @@ use std::fmt::Write as _;
 
 use glam::{DVec2, DVec3};
 
-use super::furniture::{self, tile};
-use super::solid::Solid;
+use super::solid::{self, Solid, tile};
 
 const WIDTH: f64 = 4.0;
 const HEIGHT: f64 = 2.6;
@@ -73,7 +72,7 @@ fn shell() -> Vec<Item> {
         item("wall_right", "wall_paint", right),
         item("wall_near", "wall_paint", near),
         placed("window_frame", "white_paint", window_frame(size), 0.0, v(corner.x, corner.y, 0.0)),
-        placed("window_glass", "clear_glass", furniture::pane(size), 0.0, pane),
+        placed("window_glass", "clear_glass", solid::pane(size), 0.0, pane),
     ]
 }
 
@@ -100,7 +99,7 @@ fn window_wall() -> Solid {
 fn window_frame(size: DVec2) -> Solid {
     let bar = 0.05;
     let (back, front) = (-REVEAL / 2.0 - 0.02, -REVEAL / 2.0 + 0.02);
-    furniture::frame(size, 0.04, -0.002, 0.015)
+    solid::frame(size, 0.04, -0.002, 0.015)
         .boxed(v(size.x / 2.0 - bar / 2.0, 0.0, back), v(size.x / 2.0 + bar / 2.0, size.y, front), tile::PLAIN)
         .boxed(v(0.0, size.y * 0.62, back), v(size.x, size.y * 0.62 + bar, front), tile::PLAIN)
 }
@@ -113,21 +112,21 @@ fn objects() -> Vec<Item> {
     let on_shelf = |along: f64, y: f64| v(0.2, y, 1.3 - along);
     let glow = |item: Item, radiance| Item { radiance: Some(radiance), ..item };
     vec![
-        placed("rug", "wool", furniture::rug(), 4.0, v(1.95, 0.0, 1.7)),
-        placed("table", "table_wood", furniture::table(), 4.0, v(1.95, 0.012, 1.7)),
-        placed("bowl", "ceramic", furniture::bowl(), 0.0, v(2.1, 0.432, 1.66)),
-        placed("sofa", "fabric", furniture::sofa(), 0.0, v(1.75, 0.0, 0.5)),
-        placed("sofa_feet", "brass", furniture::sofa_feet(), 0.0, v(1.75, 0.0, 0.5)),
-        placed("shelf", "table_wood", furniture::shelf(), 90.0, v(0.18, 0.0, 1.3)),
-        placed("box_red", "red", furniture::container(v(0.3, 0.24, 0.22)), 90.0, on_shelf(-0.3, 0.415)),
-        placed("box_teal", "teal", furniture::container(v(0.4, 0.28, 0.24)), 90.0, on_shelf(0.3, 0.415)),
-        placed("box_yellow", "yellow", furniture::container(v(0.42, 0.26, 0.24)), 90.0, on_shelf(-0.28, 0.055)),
-        placed("box_small", "teal", furniture::container(v(0.14, 0.18, 0.14)), 70.0, on_shelf(0.42, 0.8)),
-        placed("box_top", "red", furniture::container(v(0.22, 0.1, 0.16)), 100.0, on_shelf(-0.4, 0.8)),
-        placed("mirror", "silver", furniture::pane(mirror), 90.0, mirror_at(0.02)),
-        placed("mirror_frame", "table_wood", furniture::frame(mirror, 0.05, 0.0, 0.035), 90.0, mirror_at(0.0)),
-        placed("lamp_stand", "brass", furniture::lamp_stand(), 0.0, v(0.42, 0.0, 0.4)),
-        glow(placed("lamp_shade", "shade", furniture::lamp_shade(), 0.0, v(0.42, 0.0, 0.4)), [6.0, 4.2, 2.4]),
+        placed("rug", "wool", solid::rug(), 4.0, v(1.95, 0.0, 1.7)),
+        placed("table", "table_wood", solid::table(), 4.0, v(1.95, 0.012, 1.7)),
+        placed("bowl", "ceramic", solid::bowl(), 0.0, v(2.1, 0.432, 1.66)),
+        placed("sofa", "fabric", solid::sofa(), 0.0, v(1.75, 0.0, 0.5)),
+        placed("sofa_feet", "brass", solid::sofa_feet(), 0.0, v(1.75, 0.0, 0.5)),
+        placed("shelf", "table_wood", solid::shelf(), 90.0, v(0.18, 0.0, 1.3)),
+        placed("box_red", "red", solid::container(v(0.3, 0.24, 0.22)), 90.0, on_shelf(-0.3, 0.415)),
+        placed("box_teal", "teal", solid::container(v(0.4, 0.28, 0.24)), 90.0, on_shelf(0.3, 0.415)),
+        placed("box_yellow", "yellow", solid::container(v(0.42, 0.26, 0.24)), 90.0, on_shelf(-0.28, 0.055)),
+        placed("box_small", "teal", solid::container(v(0.14, 0.18, 0.14)), 70.0, on_shelf(0.42, 0.8)),
+        placed("box_top", "red", solid::container(v(0.22, 0.1, 0.16)), 100.0, on_shelf(-0.4, 0.8)),
+        placed("mirror", "silver", solid::pane(mirror), 90.0, mirror_at(0.02)),
+        placed("mirror_frame", "table_wood", solid::frame(mirror, 0.05, 0.0, 0.035), 90.0, mirror_at(0.0)),
+        placed("lamp_stand", "brass", solid::lamp_stand(), 0.0, v(0.42, 0.0, 0.4)),
+        glow(placed("lamp_shade", "shade", solid::lamp_shade(), 0.0, v(0.42, 0.0, 0.4)), [6.0, 4.2, 2.4]),
     ]
 }
 

@@ -6,7 +6,6 @@ use std::path::Path;
 /// A file in a zip: its packed bytes, and what the central directory states of it.
 #[derive(Clone)]
 pub struct ZipEntry {
-    /// Its name.
     pub name: Vec<u8>,
     /// Its bytes as they are stored.
     pub data: Vec<u8>,

@@ -21,7 +21,7 @@ use mateval_scene::{glb, reference_io};
 use mateval_submission::texel_map::TexelMap;
 use mateval_tracer::World;
 
-use crate::kept_folder::kept_folder;
+use crate::kept_folder;
 
 /// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is
 /// fitted by a light stage.

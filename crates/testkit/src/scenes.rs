@@ -1,4 +1,4 @@
-//! Small scenes built in code.
+//! Small scenes built in code, among them a closed room of 4 x 2.5 x 6 metres with a camera in it.
 
 use std::sync::Arc;
 
@@ -103,7 +103,6 @@ impl Builder {
         self
     }
 
-    /// Adds a light.
     pub fn light(mut self, emission: Emission) -> Self {
         self.0.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
         self
@@ -131,4 +130,46 @@ pub fn camera(position: [f64; 3], target: [f64; 3], size: u32, fov_deg: f64) -> 
     let (position, target) = (DVec3::from_array(position), DVec3::from_array(target));
     let up = if (target - position).normalize().y.abs() > 0.99 { DVec3::Z } else { DVec3::Y };
     Camera::look_at(position, target, up, Intrinsics::from_fov_x(size, size, fov_deg.to_radians())).unwrap()
+}
+
+/// The four walls among the room's surfaces; added meshes come after them.
+pub const WALLS: [usize; 4] = [2, 3, 4, 5];
+
+pub fn box_quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
+    let (corner, u, v) = (Vec3::from(corner), Vec3::from(u), Vec3::from(v));
+    TriangleMesh {
+        positions: vec![corner, corner + u, corner + u + v, corner + v],
+        uvs: Some(vec![Vec2::ZERO; 4]),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Default::default()
+    }
+}
+
+/// Floor, ceiling, walls at x = 0 and 4 and at z = 0 and 6, then `more`; all of one grey.
+pub fn box_room(more: Vec<TriangleMesh>) -> ReferenceScene {
+    let [x, y, z] = [[4.0, 0.0, 0.0], [0.0, 2.5, 0.0], [0.0, 0.0, 6.0]];
+    let mut meshes = vec![
+        box_quad([0.0; 3], x, z),
+        box_quad([0.0, 2.5, 0.0], x, z),
+        box_quad([0.0; 3], y, z),
+        box_quad([4.0, 0.0, 0.0], y, z),
+        box_quad([0.0; 3], x, y),
+        box_quad([0.0, 0.0, 6.0], x, y),
+    ];
+    meshes.extend(more);
+    let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
+    let material = Material { name: String::new(), model, two_sided: true, opacity: None, bump: None };
+    let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
+    ReferenceScene {
+        surfaces: meshes.into_iter().map(surface).collect(),
+        materials: vec![material],
+        ..Default::default()
+    }
+}
+
+/// At the back of the room, looking along -z to the far wall, 60 degrees wide.
+pub fn box_camera() -> Camera {
+    let intrinsics = Intrinsics::from_fov_x(320, 180, 60_f64.to_radians());
+    Camera::look_at(DVec3::new(2.0, 1.2, 5.5), DVec3::new(2.0, 1.2, 0.0), DVec3::Y, intrinsics)
+        .expect("the camera looks along an axis")
 }

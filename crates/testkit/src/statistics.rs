@@ -1,7 +1,9 @@
-//! Statistics for comparing noisy pictures.
+//! Noisy pictures: statistics that compare them, and pictures whose expectation is known, for tests of metrics that remove
+//! noise.
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;
+use mateval_scene::splitmix64::{INCREMENT, number};
 use mateval_tracer::{RenderSettings, World, render};
 
 /// Independent renders of one view.
@@ -10,9 +12,7 @@ pub struct Renders(Vec<Picture<LinearRgb>>);
 /// A mean with its standard error.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
-    /// The mean.
     pub mean: f64,
-    /// Its standard error.
     pub error: f64,
 }
 
@@ -63,7 +63,6 @@ impl Renders {
         Self(self.0.iter().map(|picture| picture.map(|pixel| LinearRgb(pixel.0.map(|v| factor * v)))).collect())
     }
 
-    /// The individual renders.
     pub fn pictures(&self) -> &[Picture<LinearRgb>] {
         &self.0
     }
@@ -83,7 +82,6 @@ impl Renders {
         self.region(0..self.0[0].width(), 0..self.0[0].height())
     }
 
-    /// The mean picture.
     pub fn picture(&self) -> Picture<LinearRgb> {
         let n = self.0.len() as f32;
         Picture::from_fn(self.0[0].width(), self.0[0].height(), |x, y| {
@@ -96,4 +94,77 @@ impl Renders {
             LinearRgb(sum)
         })
     }
+}
+
+/// The distribution of single samples about their mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scatter {
+    /// The sum of four uniform values.
+    GaussianLike,
+    /// As in path tracing: nine of ten samples find no light, the tenth finds ten times the mean.
+    HeavyTailed,
+}
+
+pub const SCATTERS: [Scatter; 2] = [Scatter::GaussianLike, Scatter::HeavyTailed];
+
+/// How a picture is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct Render<'a> {
+    /// The distribution of its samples.
+    pub scatter: Scatter,
+    /// The share of each sample that scatters.
+    pub strength: f64,
+    pub samples: u32,
+    /// If given, three of four samples are shared by all pixels of a block, in all views.
+    pub blocks: Option<&'a Picture<u32>>,
+    /// The view; two views have different noise except in shared samples.
+    pub view: u64,
+}
+
+impl Render<'_> {
+    /// A noisy picture whose expectation is `truth`.
+    pub fn picture(&self, truth: &Picture<LinearRgb>, seed: u64) -> Picture<LinearRgb> {
+        Picture::from_fn(truth.width(), truth.height(), |x, y| {
+            let own = 1 + (self.view << 40 | (y as u64) << 20 | x as u64);
+            let block = self.blocks.map_or(own, |blocks| u64::from(blocks.get(x, y)) << 44);
+            let factor = |channel: u64| {
+                let place = |sample: u32| if sample % 4 < 3 { block } else { own };
+                let value = |sample| self.sample(hash(hash(seed, place(sample)), u64::from(sample) << 2 | channel));
+                (0..self.samples).map(value).sum::<f64>() / f64::from(self.samples)
+            };
+            let LinearRgb(rgb) = truth.get(x, y);
+            LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * factor(c as u64)) as f32))
+        })
+    }
+
+    /// One sample's factor, of mean 1.
+    fn sample(&self, random: u64) -> f64 {
+        let unit = |shift: u32| (f64::from((random >> shift) as u16) + 0.5) / 65536.0;
+        let factor = match self.scatter {
+            // The variance of the sum is 1/3.
+            Scatter::GaussianLike => 1.0 + 3.0_f64.sqrt() * (unit(0) + unit(16) + unit(32) + unit(48) - 2.0),
+            Scatter::HeavyTailed => f64::from(u8::from(random.is_multiple_of(10))) * 10.0,
+        };
+        1.0 + self.strength * (factor - 1.0)
+    }
+}
+
+/// Mixes two numbers into one.
+fn hash(state: u64, word: u64) -> u64 {
+    let mixed = state ^ word.wrapping_add(1).wrapping_mul(INCREMENT);
+    number(mixed.wrapping_sub(INCREMENT), 0)
+}
+
+/// A picture with gradients and waves, `side` pixels square, values of 0.05 to 0.95.
+pub fn waves(side: usize) -> Picture<LinearRgb> {
+    Picture::from_fn(side, side, |x, y| {
+        let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
+        LinearRgb([0.05 + 0.9 * u, 0.05 + 0.5 * v, 0.3 + 0.25 * (0.7 * x as f32).sin() * (0.5 * y as f32).cos()])
+    })
+}
+
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt())
 }

@@ -2,15 +2,14 @@
 
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_metrics::{Psnr, mse};
+use mateval_prep::views::base_color_at_centres;
 use mateval_scene::dataset::View;
 use mateval_scene::layout::SceneFolder;
 use mateval_tracer::World;
 
-use super::bounds::{BASE_COLOR_PSNR_DB, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG};
-use super::file::{Check, Quantity, State};
-use super::theirs::TheirView;
-use super::tiles::median;
-use mateval_prep::views::base_color_at_centres;
+use super::file::{BASE_COLOR_PSNR_DB, Check, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG, Quantity, State};
+use super::light::median;
+use super::pictures::TheirView;
 
 /// The dataset's own pictures of a view.
 pub(super) struct OurGeometry {

@@ -1,61 +1,49 @@
 //! Compares Blender's pictures of a dataset with those of the built-in tracer, view by view.
 //!
-//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`text`] prints as tables; its verdict, which is kept in
+//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`report`] prints as tables; its verdict, which is kept in
 //! the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
 //!
-//! Between: `theirs` reads Blender's pictures, `samples` decides how many samples ours take, and `ours` renders; `geometry`
-//! compares pictures without light, and `light` compares pictures of light by `tiles`. `kind` states which materials may
-//! differ, [`bounds`] how far. `source` compares converted materials with the source's own. `previews` and `page` show the
-//! result.
+//! Between: `pictures` reads Blender's pictures and renders ours; `geometry` compares pictures without light, and `light`
+//! compares pictures of light tile by tile. [`mod@file`] states which materials may differ and how far. Converted materials
+//! are compared with the source's own by the built-in tracer's pictures of both.
 
-pub mod bounds;
 pub mod file;
 mod geometry;
-pub mod kind;
 mod light;
-mod ours;
-mod page;
-mod previews;
-mod samples;
-mod source;
-#[cfg(test)]
-mod tests;
-pub mod text;
-mod theirs;
-mod tiles;
+mod pictures;
+pub mod report;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_metrics::Psnr;
+use mateval_prep::render::RendererKind;
 use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::compare_file::{self, CompareCounts, VERDICT_FORMAT};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{COMPARE, SceneFolder};
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
+use mateval_scene::render_file::RENDER_FILE;
 use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
 use mateval_scene::{Progress, Report, SceneId, json, reference_io};
 use mateval_tracer::World;
 
-use crate::error::AuditError;
-use bounds::{BOUNDS, LAMBERT_TILE, OTHER_TILE};
-use file::{COMPARE_FORMAT, CompareFile, ComparedDataset, LightComparison, SceneComparison, State, ViewComparison};
-use geometry::{OurGeometry, TheirGeometry};
-use kind::MaterialKind;
-use light::ShownKinds;
-use mateval_prep::render::RendererKind;
-use mateval_scene::render_file::RENDER_FILE;
-use ours::OurLight;
-use previews::ViewPreviews;
-use samples::PILOT;
-use theirs::{TheirView, file_check};
-use tiles::Halves;
+use self::file::{
+    BOUNDS, COMPARE_FORMAT, CompareFile, ComparedDataset, LAMBERT_TILE, LightComparison, MaterialKind, OTHER_TILE,
+    SceneComparison, SourceComparison, State, ViewComparison, file_check,
+};
+use self::geometry::{OurGeometry, TheirGeometry};
+use self::light::{Halves, ShownKinds};
+use self::pictures::{OurLight, PILOT, TheirView};
+use self::report::ViewPreviews;
+use crate::AuditError;
 
 /// What to compare, and where to write the page.
 #[derive(Clone, Debug, Default)]
 pub struct CompareOptions {
-    /// The dataset's folder.
     pub dataset: PathBuf,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,
@@ -114,7 +102,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     }
     if let Some(work) = work {
         json::write(&work.path().join(COMPARE), &file)?;
-        mateval_image::store::write_whole(&work.path().join("index.html"), page::page(&file, &previews).as_bytes())?;
+        mateval_image::store::write_whole(&work.path().join("index.html"), report::page(&file, &previews).as_bytes())?;
         work.finish()?;
     }
     Ok(file)
@@ -201,7 +189,7 @@ fn compare_scene(
     };
     let mut ours = match compared.is_empty() {
         true => Vec::new(),
-        false => ours::render(&world, &scene.id, &compared, samples, progress)?,
+        false => pictures::render_ours(&world, &scene.id, &compared, samples, progress)?,
     }
     .into_iter();
     let first_rgb = ours.as_slice().first().map(|light| light.rgb.clone());
@@ -222,13 +210,12 @@ fn compare_scene(
     progress(Report::step(&step, scene.views.len(), scene.views.len()));
     let source_materials = match (compared.first(), first_rgb) {
         (Some(view), Some(rgb)) => {
-            let against =
-                source::Converted { folder, scene, view, world: &world, rgb: &rgb, kinds: &kinds, tile_bound };
+            let against = Converted { folder, scene, view, world: &world, rgb: &rgb, kinds: &kinds, tile_bound };
             against.compare(samples, progress)?
         }
         _ => None,
     };
-    let seeds = ours::seeds(&scene.id).map(|seed| format!("{seed:016x}"));
+    let seeds = pictures::seeds(&scene.id).map(|seed| format!("{seed:016x}"));
     let kinds = kinds.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
     let found = SceneComparison {
         scene: scene.id.clone(),
@@ -265,16 +252,16 @@ impl Pilot<'_> {
     /// The number of samples for all views, at most as many as Blender's.
     fn samples(&self, views: &[&View], progress: Progress<'_>) -> Result<u32, AuditError> {
         let their_views: Vec<TheirView> = views.iter().filter_map(|view| their_view(self.folder, view)).collect();
-        let most = samples::theirs(&their_views)?;
+        let most = pictures::most_samples(&their_views)?;
         if most <= PILOT {
             return Ok(most);
         }
-        let ours = ours::render(self.world, self.id, views, PILOT, progress)?;
+        let ours = pictures::render_ours(self.world, self.id, views, PILOT, progress)?;
         let mut wanted = PILOT;
         for ((view, ours), theirs) in views.iter().zip(&ours).zip(&their_views) {
             let geometry = OurGeometry::read(self.folder, view, self.world)?;
             let shown = ShownKinds::new(&geometry.instance, self.kinds, &geometry.valid);
-            wanted = wanted.max(samples::wanted(ours, theirs, &shown, self.tile_bound));
+            wanted = wanted.max(pictures::wanted_samples(ours, theirs, &shown, self.tile_bound));
         }
         Ok(wanted.min(most))
     }
@@ -371,4 +358,67 @@ impl ViewPair<'_> {
             }
         }
     }
+}
+
+/// A view of a scene, rendered with its converted materials.
+struct Converted<'a> {
+    folder: &'a SceneFolder,
+    scene: &'a SceneFile,
+    view: &'a View,
+    world: &'a World,
+    rgb: &'a Halves,
+    kinds: &'a [MaterialKind],
+    tile_bound: f64,
+}
+
+impl Converted<'_> {
+    /// Renders the view with the source's own materials and compares; none where the materials were not converted.
+    fn compare(&self, samples: u32, progress: Progress<'_>) -> Result<Option<SourceComparison>, AuditError> {
+        let reference = self.world.scene();
+        let Some(source) = reference_io::read_source_materials(self.folder, reference.materials.len())? else {
+            return Ok(None);
+        };
+        let theirs = World::sharing(Arc::new(source.in_scene(reference)), self.world.accel().clone())?;
+        let theirs = pictures::render_ours(&theirs, &self.scene.id, &[self.view], samples, progress)?;
+        let Some(theirs) = theirs.first().map(|light| &light.rgb) else { return Ok(None) };
+        let geometry = OurGeometry::read(self.folder, self.view, self.world)?;
+        let shown = ShownKinds::new(&geometry.instance, self.kinds, &geometry.valid);
+        let (light, _) = light::compare("rgb", None, [self.rgb, theirs], &shown, self.tile_bound);
+        let error = self.error_without_noise(theirs, &geometry.valid).filter(|error| *error > 0.0);
+        let psnr_db = error.and_then(|error| Psnr::from_mse(error).ok()).map(|psnr| psnr.db);
+        Ok(Some(SourceComparison { view: self.view.id.clone(), psnr_db, light }))
+    }
+
+    /// The mean over valid pixels of the product of the halves' errors, which are independent of each other, as a preview
+    /// shows them; none where no pixel is valid.
+    fn error_without_noise(&self, theirs: &Halves, valid: &Mask) -> Option<f64> {
+        let errors = [(&self.rgb.a, &theirs.a), (&self.rgb.b, &theirs.b)]
+            .map(|(ours, theirs)| (self.exposed(ours).to_srgb(), self.exposed(theirs).to_srgb()));
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for at in (0..valid.pixels().len()).filter(|at| valid.pixels()[*at]) {
+            for channel in 0..3 {
+                let [a, b] = [&errors[0], &errors[1]].map(|(ours, theirs)| {
+                    f64::from(theirs.pixels()[at].0[channel]) - f64::from(ours.pixels()[at].0[channel])
+                });
+                sum += a * b;
+            }
+            count += 3;
+        }
+        (count > 0).then(|| sum / count as f64)
+    }
+
+    fn exposed(&self, picture: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+        let exposure = self.scene.exposure as f32;
+        picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|value| (value * exposure).clamp(0.0, 1.0))))
+    }
+}
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod bounds {
+    pub use super::file::BOUNDS;
+}
+#[doc(hidden)]
+pub mod text {
+    pub use super::report::verdict;
 }

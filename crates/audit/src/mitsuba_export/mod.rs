@@ -4,25 +4,19 @@
 //! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that Mitsuba cannot express.
 //! The scene contains the nearest that it can.
 //!
-//! Between: `sensor` converts the camera, `ply` meshes, `bsdf` materials (with `texture`) and `emitter` lights (with
-//! `texture` and `unfolded`); `element` writes the XML. Names of the source appear in comments of the XML only, so that no
-//! name can become a path or markup.
+//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights; `files` writes XML
+//! and meshes. Names of the source appear in comments of the XML only, so that no name can become a path or markup.
 
-mod bsdf;
-mod element;
-mod emitter;
-mod ply;
-mod remarks;
-mod sensor;
-#[cfg(test)]
-mod tests;
-mod texture;
-mod unfolded;
+mod files;
+mod lights;
+mod materials;
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use mateval_image::Texture;
 use mateval_image::store::write_whole;
+use mateval_prep::recipe::{self, RECIPE};
 use mateval_scene::dataset::View;
 use mateval_scene::material::Material;
 use mateval_scene::open::Dataset;
@@ -31,14 +25,10 @@ use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Camera, Finding, SceneId, ViewId, reference_io};
 use mateval_tracer::RenderSettings;
 
+use self::files::{Element, Remarks, SCENE_FILE, Sheet};
+use self::lights::Glow;
+use self::materials::TextureFiles;
 use crate::AuditError;
-use element::Element;
-use emitter::Glow;
-use mateval_prep::recipe;
-use mateval_prep::recipe::RECIPE;
-use ply::Sheet;
-use remarks::{Remarks, SCENE_FILE};
-use texture::TextureFiles;
 
 /// Distance of the second sheet of a lamp that emits on both sides behind the first, as a share of the mesh's extent.
 const SHEET_DISTANCE: f32 = 1e-4;
@@ -48,13 +38,10 @@ const SHEET_DISTANCE: f32 = 1e-4;
 pub struct ExportOptions {
     /// The dataset's folder, which must contain the ground truth.
     pub dataset: PathBuf,
-    /// The scene.
     pub scene: SceneId,
-    /// The view.
     pub view: ViewId,
     /// Samples per pixel; the recipe's number where absent.
     pub samples: Option<u32>,
-    /// The folder to write.
     pub out: PathBuf,
     /// Replace a folder that already exists.
     pub force: bool,
@@ -118,19 +105,19 @@ fn write_scene(
     let textures = scene.texture_list();
     let mut document = Element::new("scene")
         .attribute("version", "3.0.0")
-        .child(sensor::integrator(settings))
-        .child(sensor::sensor(scene, camera, settings, remarks));
+        .child(integrator(settings))
+        .child(sensor(scene, camera, settings, remarks));
     for material in write_materials(scene, folder, &textures, remarks)? {
         document = document.child(material);
     }
-    let glows = emitter::glows(folder, scene, &textures, remarks)?;
+    let glows = lights::glows(folder, scene, &textures, remarks)?;
     for (index, surface) in scene.surfaces.iter().enumerate() {
         let glow = glows.get(&mateval_scene::reference::SurfaceIndex(index));
         for shape in write_surface(folder, index, surface, glow, remarks)? {
             document = document.child(shape);
         }
     }
-    Ok(match emitter::distant(folder, scene, &textures, remarks)? {
+    Ok(match lights::distant(folder, scene, &textures, remarks)? {
         Some(light) => document.child(light),
         None => document,
     })
@@ -148,7 +135,7 @@ fn write_materials(
     let mut write = |index: usize| {
         let material: &Material = &scene.materials[index];
         let place = format!("material {index} '{}'", material.name);
-        let bsdf = bsdf::bsdf(material, &place, &mut files, remarks)?;
+        let bsdf = materials::bsdf(material, &place, &mut files, remarks)?;
         Ok(bsdf.attribute("id", material_id(index)).remark(&material.name))
     };
     (0..scene.materials.len()).filter(used).map(&mut write).collect()
@@ -170,7 +157,7 @@ fn write_surface(
         return Ok(Vec::new());
     }
     let place = format!("surface {index} '{}'", surface.name);
-    let bent = ply::bent_triangles(&surface.mesh);
+    let bent = files::bent_triangles(&surface.mesh);
     if bent > 0 && glow.is_none() {
         let message = format!("{bent} triangles have a vertex normal behind their front");
         remarks.note(
@@ -194,7 +181,7 @@ fn write_surface(
     }
     let mut shapes = Vec::new();
     for (file, sheet) in sheets {
-        let (bytes, normals) = ply::bytes(&surface.mesh, sheet);
+        let (bytes, normals) = files::ply_bytes(&surface.mesh, sheet);
         write_whole(&folder.join(&file), &bytes)?;
         let shape = Element::plugin("shape", "ply")
             .remark(&surface.name)
@@ -213,4 +200,311 @@ fn extent(surface: &Surface) -> f32 {
     let low = positions().reduce(glam::Vec3::min).unwrap_or_default();
     let high = positions().reduce(glam::Vec3::max).unwrap_or_default();
     (high - low).length()
+}
+
+/// The path tracer. Mitsuba's `max_depth` also counts the camera's ray and the last direct light, hence 2 more.
+fn integrator(settings: &RenderSettings) -> Element {
+    Element::plugin("integrator", "path").integer("max_depth", settings.max_bounces.saturating_add(2))
+}
+
+/// The camera, with a box filter over pixels and independent samples.
+fn sensor(scene: &ReferenceScene, camera: &Camera, settings: &RenderSettings, remarks: &mut Remarks) -> Element {
+    let k = &camera.intrinsics;
+    if (k.fx / k.fy - 1.0).abs() > 1e-9 {
+        let message = format!("focal lengths are {} and {} pixels; Mitsuba's pixels are square", k.fx, k.fy);
+        remarks.warn("square_pixels", "camera", &message, "wrote the first of them");
+    }
+    let (width, height) = (f64::from(k.width), f64::from(k.height));
+    let fov = 2.0 * libm::atan(width / (2.0 * k.fx)).to_degrees();
+    let reach = reach(scene, camera.position());
+    Element::plugin("sensor", "perspective")
+        .string("fov_axis", "x")
+        .float("fov", fov)
+        .float("principal_point_offset_x", 0.5 - k.cx / width)
+        .float("principal_point_offset_y", 0.5 - k.cy / height)
+        .float("near_clip", reach * 1e-4)
+        .float("far_clip", reach * 4.0)
+        .matrix("to_world", turned(camera))
+        .child(
+            Element::plugin("film", "hdrfilm")
+                .integer("width", k.width)
+                .integer("height", k.height)
+                .string("pixel_format", "rgb")
+                .string("component_format", "float32")
+                .child(Element::plugin("rfilter", "box")),
+        )
+        .child(
+            Element::plugin("sampler", "independent")
+                .integer("sample_count", settings.samples)
+                .integer("seed", settings.seed & 0x7fff_ffff),
+        )
+}
+
+/// The camera's pose for Mitsuba, whose cameras look along +Z with +X to the left: x and z change sign.
+fn turned(camera: &Camera) -> [[f64; 4]; 4] {
+    camera.world_from_camera.map(|[x, y, z, t]| [-x, y, -z, t])
+}
+
+/// The distance from the camera to the farthest corner of the scene's bounding box, in metres.
+fn reach(scene: &ReferenceScene, from: DVec3) -> f64 {
+    let positions = || scene.surfaces.iter().flat_map(|surface| &surface.mesh.positions).map(|p| p.as_dvec3());
+    let farthest = positions().map(|p| (p - from).abs()).reduce(DVec3::max).unwrap_or(DVec3::ONE);
+    farthest.length().max(1e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec2, Vec3};
+    use mateval_image::{LinearRgb, Texels, Wrap, exr_io};
+    use mateval_scene::material::{
+        ColorInput, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
+    };
+    use mateval_scene::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, SourceTexture, SurfaceIndex};
+    use mateval_scene::{Intrinsics, Severity, TriangleMesh};
+
+    use super::*;
+
+    /// The direction of the picture's corner, computed here from the matrix and field of view as Mitsuba does (PEERS B3: +Z
+    /// ahead, +X left), equals that of our camera.
+    #[test]
+    fn the_corner_pixel_looks_the_same_way() {
+        let intrinsics = Intrinsics::from_fov_x(64, 48, 1.1);
+        let camera = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 0.5, 0.0), DVec3::Y, intrinsics);
+        let camera = camera.unwrap();
+        let ours = camera.direction(glam::DVec2::new(0.0, 0.0));
+        let rows = turned(&camera);
+        let tan = 64.0 / (2.0 * intrinsics.fx);
+        let local = DVec3::new(tan, tan * 48.0 / 64.0, 1.0).normalize();
+        let theirs = DVec3::from_array([0, 1, 2].map(|r| DVec3::from_slice(&rows[r][..3]).dot(local)));
+        assert!((ours - theirs).length() < 1e-9, "{ours} {theirs}");
+    }
+
+    const GREY: ColorInput = ColorInput::Constant([0.5; 3]);
+
+    fn square(normals: bool) -> TriangleMesh {
+        TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y],
+            normals: normals.then(|| vec![Vec3::Z; 4]),
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        }
+    }
+
+    fn material(model: MaterialModel) -> Material {
+        Material { name: "m".to_owned(), model, two_sided: true, opacity: None, bump: None }
+    }
+
+    /// One square of each material, one texture.
+    fn scene(materials: Vec<Material>) -> ReferenceScene {
+        let texels = Texels::Grey8(vec![0, 51, 102, 255]);
+        let texture = Texture::new(2, 2, texels, Wrap::Mirror).unwrap();
+        let surface = |k: usize| Surface { name: "s".to_owned(), mesh: square(true), material: MaterialIndex(k) };
+        ReferenceScene {
+            surfaces: (0..materials.len()).map(surface).collect(),
+            materials,
+            textures: vec![SourceTexture { name: String::new(), sha256: None, texture }],
+            lights: Vec::new(),
+        }
+    }
+
+    fn diffuse() -> Material {
+        material(MaterialModel::Diffuse { reflectance: GREY, alpha: None })
+    }
+
+    fn camera() -> Camera {
+        Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, Intrinsics::from_fov_x(8, 6, 1.0)).unwrap()
+    }
+
+    /// The codes of an export's findings and the text of its `scene.xml`. Checks that every file that it refers to exists.
+    fn exported(scene: &ReferenceScene) -> (Vec<(Severity, String)>, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let findings = export(scene, &camera(), &RenderSettings::default(), &out).unwrap();
+        let text = std::fs::read_to_string(out.join("scene.xml")).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        for node in document.descendants().filter(|node| node.attribute("name") == Some("filename")) {
+            let file = node.attribute("value").unwrap();
+            assert!(!file.contains("..") && !file.starts_with('/') && out.join(file).is_file(), "{file}");
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        (findings.into_iter().map(|finding| (finding.severity, finding.code)).collect(), text)
+    }
+
+    fn warnings(scene: &ReferenceScene) -> Vec<String> {
+        let warnings = exported(scene).0.into_iter().filter(|(severity, _)| *severity == Severity::Warning);
+        warnings.map(|(_, code)| code).collect()
+    }
+
+    fn light(emission: Emission) -> LightGroup {
+        LightGroup { name: "l".to_owned(), emission, camera_visible: true }
+    }
+
+    fn area(two_sided: bool) -> LightGroup {
+        light(Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [2.0; 3], map: None, two_sided })
+    }
+
+    fn textured() -> ScalarInput {
+        ScalarInput::Texture { texture: TextureIndex(0), channel: 1, uv: Default::default() }
+    }
+
+    fn rough_plastic(alpha: ScalarInput) -> Material {
+        material(MaterialModel::Plastic {
+            eta: 1.5,
+            nonlinear: true,
+            diffuse_reflectance: GREY,
+            specular_reflectance: GREY,
+            microfacets: Some(Microfacets { distribution: Distribution::Ggx, alpha }),
+        })
+    }
+
+    fn principled(flavour: PrincipledFlavour) -> Material {
+        material(MaterialModel::Principled {
+            base_color: GREY,
+            roughness: textured(),
+            metallic: ScalarInput::Constant(0.0),
+            specular: 0.5,
+            flavour,
+        })
+    }
+
+    /// Everything that Mitsuba cannot express gives a warning; the twin that it can express gives none.
+    #[test]
+    fn what_mitsuba_cannot_express_is_a_warning() {
+        let changed = |change: &dyn Fn(&mut ReferenceScene)| {
+            let mut scene = scene(vec![diffuse()]);
+            change(&mut scene);
+            scene
+        };
+        let sky = || light(Emission::Constant { radiance: [1.0; 3] });
+        let masked = || Material { opacity: Some(textured()), ..diffuse() };
+        let hidden = || LightGroup { camera_visible: false, ..area(false) };
+        let oren_nayar = MaterialModel::Diffuse { reflectance: GREY, alpha: Some(ScalarInput::Constant(0.3)) };
+        let bright = MaterialModel::Diffuse { reflectance: ColorInput::Constant([1.5; 3]), alpha: None };
+        let folded = || {
+            let mut scene = mapped_lamp();
+            scene.surfaces[0].mesh.uvs = Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::X]);
+            scene
+        };
+        let cases: [(ReferenceScene, &[&str]); 14] = [
+            (scene(vec![diffuse()]), &[]),
+            (scene(vec![material(oren_nayar)]), &["oren_nayar"]),
+            (scene(vec![material(bright)]), &["color_range"]),
+            (scene(vec![principled(PrincipledFlavour::Mitsuba)]), &[]),
+            (scene(vec![principled(PrincipledFlavour::Blender)]), &["blender_principled"]),
+            (scene(vec![rough_plastic(ScalarInput::Constant(0.2))]), &[]),
+            (scene(vec![rough_plastic(textured())]), &["alpha_texture"]),
+            (changed(&|scene| scene.lights = vec![area(true), sky()]), &[]),
+            (changed(&|scene| scene.lights = vec![hidden(), sky()]), &["camera_invisible"]),
+            (changed(&|scene| scene.lights = vec![sky(), sky()]), &["second_environment"]),
+            (changed(&|scene| scene.materials = vec![masked()]), &[]),
+            (
+                changed(&|scene| (scene.materials, scene.lights) = (vec![masked()], vec![area(false)])),
+                &["masked_light"],
+            ),
+            (mapped_lamp(), &[]),
+            (folded(), &["folded_light"]),
+        ];
+        for (scene, expected) in cases {
+            assert_eq!(warnings(&scene), expected, "{scene:?}");
+        }
+    }
+
+    /// A lamp that emits on both sides becomes two flat shapes, any other surface one. A texture that is used twice is written
+    /// once.
+    #[test]
+    fn shapes_and_files() {
+        let mut scene = scene(vec![principled(PrincipledFlavour::Mitsuba), principled(PrincipledFlavour::Mitsuba)]);
+        scene.lights = vec![area(true)];
+        let (codes, text) = exported(&scene);
+        let codes: Vec<&str> = codes.iter().map(|(_, code)| code.as_str()).collect();
+        assert_eq!(codes, ["flat_light", "two_sided_light"]);
+        assert_eq!((text.matches("<shape").count(), text.matches("<emitter").count()), (3, 2));
+        assert_eq!(text.matches("textures/0_green.png").count(), 2);
+        assert!(text.contains("<string name=\"wrap_mode\" value=\"mirror\"/>"));
+        assert!(text.contains("<integer name=\"max_depth\" value=\"18\"/>"));
+        assert_eq!(exported(&ReferenceScene::default()).0, []);
+    }
+
+    /// A scene with one lamp, whose radiance is (2, 3, 4) times the texture.
+    fn mapped_lamp() -> ReferenceScene {
+        let mut scene = scene(vec![diffuse()]);
+        let uv = UvTransform([[2.0, 0.0, 0.0], [0.0, 1.0, 0.25]]);
+        let map = Some(EmissionMap { texture: TextureIndex(0), uv });
+        let surfaces = vec![SurfaceIndex(0)];
+        scene.lights = vec![light(Emission::Area { surfaces, radiance: [2.0, 3.0, 4.0], map, two_sided: false })];
+        scene
+    }
+
+    /// A textured light becomes a bitmap of its radiance in floats, or a constant where all texels are equal.
+    #[test]
+    fn textured_lights() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        export(&mapped_lamp(), &camera(), &RenderSettings::default(), &out).unwrap();
+        let text = std::fs::read_to_string(out.join("scene.xml")).unwrap();
+        let emitter = &text[text.find("<emitter").unwrap()..text.find("</emitter>").unwrap()];
+        for part in [
+            "<texture type=\"bitmap\" name=\"radiance\">",
+            "textures/light_0.exr",
+            "<boolean name=\"raw\" value=\"true\"/>",
+            "value=\"mirror\"",
+            "value=\"2 0 0 0 0 -1 0 0.75 0 0 1 0 0 0 0 1\"",
+        ] {
+            assert!(emitter.contains(part), "{part}: {emitter}");
+        }
+        let picture = exr_io::read_linear(&out.join("textures/light_0.exr")).unwrap();
+        let expected = [0.0, 0.2, 0.4, 1.0].map(|share| LinearRgb([2.0 * share, 3.0 * share, 4.0 * share]));
+        for (found, expected) in picture.pixels().iter().zip(expected) {
+            assert!((0..3).all(|c| (found.0[c] - expected.0[c]).abs() < 1e-6), "{found:?} {expected:?}");
+        }
+
+        let constant = |change: &dyn Fn(&mut ReferenceScene)| {
+            let mut scene = mapped_lamp();
+            change(&mut scene);
+            assert_eq!(warnings(&scene), [""; 0]);
+            exported(&scene).1
+        };
+        let set = |scene: &mut ReferenceScene, texels: Vec<u8>, side: usize| {
+            scene.textures[0].texture = Texture::new(side, side, Texels::Grey8(texels), Wrap::Repeat).unwrap();
+        };
+        let half = constant(&|scene| set(scene, vec![51], 1));
+        assert!(half.contains("<rgb name=\"radiance\" value=\"0.4 0.6 0.8\"/>"), "{half}");
+        let black = constant(&|scene| set(scene, vec![0; 4], 2));
+        assert!(black.contains("<rgb name=\"radiance\" value=\"0 0 0\"/>"), "{black}");
+        // Looked up at uv (0, 0), that is at (0, 0.25): the lower left texel.
+        let without_uv = constant(&|scene| scene.surfaces[0].mesh.uvs = None);
+        assert!(without_uv.contains("<rgb name=\"radiance\" value=\"0.8 1.2 1.6\"/>"), "{without_uv}");
+    }
+
+    /// Names that try to leave a folder, an attribute or a comment, or to control a terminal.
+    #[test]
+    fn hostile_names_stay_comments() {
+        let hostile =
+            "../../etc/passwd --> <boom a=\"1\"/> <![CDATA[ &x; \u{1b}[31m\u{0}\n".to_owned() + &"long".repeat(9999);
+        let mut scene = scene(vec![diffuse()]);
+        scene.materials[0].name = hostile.clone();
+        scene.surfaces[0].name = hostile.clone();
+        scene.textures[0].name = hostile.clone();
+        scene.lights = vec![LightGroup { name: hostile, ..area(false) }];
+        let text = exported(&scene).1;
+        let document = roxmltree::Document::parse(&text).unwrap();
+        assert!(!text.contains("<boom") && !text.contains('\u{1b}') && text.len() < 5000, "{text}");
+        assert_eq!(document.descendants().filter(|node| node.has_tag_name("boom")).count(), 0);
+    }
+
+    /// An existing folder is replaced as a whole. A folder that cannot be created is an error and leaves no files.
+    #[test]
+    fn the_folder_is_complete_or_does_not_exist() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        std::fs::create_dir(&out).unwrap();
+        std::fs::write(out.join("older"), "x").unwrap();
+        export(&scene(vec![diffuse()]), &camera(), &RenderSettings::default(), &out).unwrap();
+        assert!(out.join("scene.xml").is_file() && !out.join("older").exists());
+        let file = folder.path().join("file");
+        std::fs::write(&file, "x").unwrap();
+        let below = file.join("out");
+        assert!(export(&scene(vec![diffuse()]), &camera(), &RenderSettings::default(), &below).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
 }

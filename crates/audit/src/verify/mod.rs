@@ -1,12 +1,8 @@
 //! Checks a dataset against the rules of its format. Every fault is reported, none is fixed.
 
-mod geometry;
-mod photo;
 mod pictures;
 mod renders;
-mod scene_file;
-mod schema;
-mod scorer;
+mod scene;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -23,7 +19,8 @@ use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, js
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
 
-use crate::error::AuditError;
+use self::scene::{check_scene_file, check_schema};
+use crate::AuditError;
 
 /// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound dataset has
 /// no finding of severity `error`. Fails where the folder contains no dataset.
@@ -44,8 +41,8 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, Audit
             action: "run `mateval prep finish`".to_owned(),
         });
     }
-    schema::check::<DatasetFile>(root, DATASET, &mut faults);
-    schema::check::<TargetsFile>(root, TARGETS, &mut faults);
+    check_schema::<DatasetFile>(root, DATASET, &mut faults);
+    check_schema::<TargetsFile>(root, TARGETS, &mut faults);
     let dataset = read_json::<DatasetFile>(DATASET, &dataset_path, &mut faults);
     // A manifest that cannot be read is reported by the next step.
     let absent = dataset.as_ref().and_then(|dataset| absent_scenes(root, dataset).ok()).unwrap_or_default();
@@ -149,7 +146,7 @@ fn check_targets(root: &Path, dataset: &DatasetFile, absent: &[SceneId], faults:
 /// Checks the source's own materials, where there are any. `count` is the number of the scene's materials.
 fn check_source_materials(folder: &SceneFolder, count: usize, faults: &mut Faults) {
     if folder.source_materials().join(reference_io::SOURCE_MATERIALS).exists() {
-        schema::check::<reference_io::SourceMaterialsFile>(
+        check_schema::<reference_io::SourceMaterialsFile>(
             &folder.source_materials(),
             reference_io::SOURCE_MATERIALS,
             faults,
@@ -164,7 +161,7 @@ fn check_material_classes(folder: &SceneFolder, scene: &SceneFile, faults: &mut 
     if !folder.material_classes().exists() {
         return;
     }
-    schema::check::<MaterialClassesFile>(folder.path(), FILE, faults);
+    check_schema::<MaterialClassesFile>(folder.path(), FILE, faults);
     let Some(file) = read_json::<MaterialClassesFile>(FILE, &folder.material_classes(), faults) else { return };
     if !file.parts.iter().map(|part| &part.part).eq(scene.parts.iter().map(|part| &part.id)) {
         faults.add("wrong_parts", FILE, "/parts", "expected the parts of scene.json in their order");
@@ -172,34 +169,34 @@ fn check_material_classes(folder: &SceneFolder, scene: &SceneFile, faults: &mut 
 }
 
 fn check_scene(root: &Path, folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
-    schema::check::<SceneFile>(folder.path(), "scene.json", faults);
+    check_schema::<SceneFile>(folder.path(), "scene.json", faults);
     let Some(scene) = read_json::<SceneFile>("scene.json", &folder.scene_file(), faults) else { return };
     if scene.id.as_str() != id {
         faults.add("wrong_id", "scene.json", "/id", format!("'{}', but its folder is '{id}'", scene.id));
     }
-    scene_file::check(&scene, faults);
-    scorer::check(root, folder, dataset, &scene, faults);
+    check_scene_file(&scene, faults);
+    renders::check_scorer(root, folder, dataset, &scene, faults);
     let Some(meshes) = scene_meshes::check(folder, &scene, faults) else { return };
     let world = match folder.truth().is_dir() {
         true => {
-            schema::check::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
-            schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
+            check_schema::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
+            check_schema::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
             let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
             check_source_materials(folder, reference.materials.len(), faults);
             check_material_classes(folder, &scene, faults);
-            geometry::check_materials(folder, &scene, faults);
-            if !geometry::matches_reference(&reference, &meshes, faults) {
+            scene::check_materials(folder, &scene, faults);
+            if !scene::matches_reference(&reference, &meshes, faults) {
                 return;
             }
             World::new(Arc::new(reference))
         }
-        false => World::new(Arc::new(geometry::opaque(&meshes))),
+        false => World::new(Arc::new(scene::opaque(&meshes))),
     };
     let Some(world) = faults.read("ground_truth/reference", world) else { return };
     pictures::check(folder, &scene, &meshes, &world, faults);
     match (&dataset.photo_renderer, &scene.photo) {
-        (_, Some(photo)) => photo::check(folder, &scene, photo, faults),
-        (Some(renderer), None) => renders::check(folder, &scene, renderer, faults),
+        (_, Some(photo)) => renders::check_photo(folder, &scene, photo, faults),
+        (Some(renderer), None) => renders::check_renders(folder, &scene, renderer, faults),
         (None, None) => {}
     }
 }

@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
+use mateval_prep::faults::Faults;
+use mateval_prep::scene_meshes::Meshes;
+use mateval_prep::views::{SeenTriangle, ViewPixel, ViewScene};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_tracer::World;
 use rayon::prelude::*;
-
-use mateval_prep::faults::Faults;
-use mateval_prep::scene_meshes::Meshes;
-use mateval_prep::views::{SeenTriangle, ViewPixel, ViewScene};
 
 /// Distance between the columns and rows that are traced again. It is prime, so that no regular pattern escapes the check.
 const STRIDE: usize = 7;

@@ -1,13 +1,19 @@
-//! Checks the photo renderer's pictures: that every view has them, at its size, and that the input view shows one of them.
+//! Checks what a scene is rendered with: the photo renderer's pictures, that every view has them, at its size, and that the
+//! input view shows one of them; the photo of a scene that is not rendered; and the scorer's reference, with which scores
+//! under light compare.
+
+use std::path::Path;
 
 use mateval_image::{LinearRgb, exr_io};
-use mateval_scene::RendererId;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::{INPUT, SceneFolder};
-
-use super::schema;
 use mateval_prep::faults::Faults;
+use mateval_scene::dataset::{DatasetFile, Photo, SceneFile};
+use mateval_scene::layout::{INPUT, SCORER_JSON, SceneFolder};
+use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::render_file::RenderFile;
+use mateval_scene::scorer_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
+use mateval_scene::{Finding, RendererId, Severity, json};
+
+use super::scene::check_schema;
 
 /// Radiance times exposure below which every channel of an 8-bit sRGB picture is 0: half a step of the linear part of the
 /// transfer curve.
@@ -26,12 +32,12 @@ fn check_light(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
 }
 
 /// Reports every view whose renders are missing, unreadable or of another size than its camera's picture.
-pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
+pub(super) fn check_renders(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
     check_light(folder, scene, faults);
     for view in &scene.views {
         if folder.truth().is_dir() {
             let file = format!("ground_truth/renders/{renderer}/{}/render.json", view.id);
-            schema::check::<RenderFile>(folder.path(), &file, faults);
+            check_schema::<RenderFile>(folder.path(), &file, faults);
         }
         let k = view.camera.intrinsics;
         let expected = (k.width as usize, k.height as usize);
@@ -57,5 +63,156 @@ pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &Renderer
                 faults.add("wrong_input", &file, "", message);
             }
         }
+    }
+}
+
+/// Reports a photo whose file the source does not list, renders that should not exist, and an input picture that is
+/// missing, unreadable or of another size than the camera's.
+pub(super) fn check_photo(folder: &SceneFolder, scene: &SceneFile, photo: &Photo, faults: &mut Faults) {
+    if !scene.source.files.iter().any(|file| file.path == photo.file) {
+        faults.add("unlisted_photo", "scene.json", "/photo/file", "expected one of the files in /source/files");
+    }
+    if folder.truth().join("renders").exists() {
+        faults.add("unexpected_renders", "ground_truth/renders", "", "expected none, since the scene has a photo");
+    }
+    let Some(input) = scene.view(INPUT) else { return };
+    let file = format!("views/{INPUT}/rgb.exr");
+    let Some(shown) = faults.read(&file, exr_io::read_linear(&folder.view(&input.id).join("rgb.exr"))) else { return };
+    let k = input.camera.intrinsics;
+    if (shown.width(), shown.height()) != (k.width as usize, k.height as usize) {
+        faults.add("wrong_size", &file, "", format!("expected {}x{} pixels", k.width, k.height));
+    }
+}
+
+/// The folder of the reference, relative to the scene's.
+const FOLDER: &str = "ground_truth/renders/scorer";
+
+/// Reports a reference that was made from other files of the scene than the manifest lists, and one whose pictures are not
+/// those that it lists. Where there is none, scores under light cannot be computed: a warning, if the dataset's pictures are
+/// rendered. Without the ground truth there is nothing to check; a scene with a photo from elsewhere has no renders.
+pub(super) fn check_scorer(
+    root: &Path,
+    folder: &SceneFolder,
+    dataset: &DatasetFile,
+    scene: &SceneFile,
+    faults: &mut Faults,
+) {
+    if scene.photo.is_some() || !folder.truth().is_dir() {
+        return;
+    }
+    let action = format!("run `mateval prep render --only scorer --scene {} {}`", scene.id, root.display());
+    let found = |severity, code: &str, file: &str, place: &str, message: String| Finding {
+        severity,
+        code: code.to_owned(),
+        file: format!("scenes/{}/{file}", scene.id),
+        place: place.to_owned(),
+        message,
+        action: format!("{action}, then `mateval prep finish {}`", root.display()),
+    };
+    if !folder.scorer().exists() {
+        if dataset.photo_renderer.is_some() {
+            let message = "the scene has no reference, without which light is not scored".to_owned();
+            faults.all.push(found(Severity::Warning, "missing_reference", FOLDER, "", message));
+        }
+        return;
+    }
+    let list = format!("{FOLDER}/{SCORER_JSON}");
+    let stale =
+        |file: &str, place: &str, message: String| found(Severity::Error, "stale_reference", file, place, message);
+    let path = folder.scorer().join(SCORER_JSON);
+    if !path.is_file() {
+        faults.all.push(stale(&list, "", "missing: the render was cut off".to_owned()));
+        return;
+    }
+    check_schema::<ScorerFile>(folder.path(), &list, faults);
+    let file = match json::read_format::<ScorerFile>(&path, SCORER_FORMAT) {
+        Ok(file) => file,
+        Err(error) => return faults.all.push(stale(&list, "", error.to_string())),
+    };
+    // A manifest that cannot be read has been reported.
+    if light_inputs_sha256(root, &scene.id).is_ok_and(|inputs| inputs != file.inputs_sha256) {
+        let message = "the pictures were made from other files of the scene than the manifest lists";
+        faults.all.push(stale(&list, "/inputs_sha256", message.to_owned()));
+    }
+    for (name, listed) in &file.files {
+        let picture = format!("{FOLDER}/{name}");
+        match sha256_of_file(&folder.scorer().join(name)) {
+            Ok(sha256) if sha256 == *listed => {}
+            Ok(sha256) => {
+                let message = format!("SHA-256 is {sha256}, but {SCORER_JSON} lists {listed}");
+                faults.all.push(stale(&picture, "", message));
+            }
+            Err(error) => faults.all.push(stale(&picture, "", error.to_string())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use mateval_scene::dataset::FORMAT;
+    use mateval_scene::{RendererId, manifest};
+
+    use super::*;
+
+    #[test]
+    fn references_that_are_missing_stale_or_changed_are_reported() {
+        let root = tempfile::tempdir().unwrap();
+        let root = root.path();
+        let example = include_str!("../../../../dataset_spec/examples/scene.json");
+        let scene: SceneFile = json::parse(Path::new("scene.json"), example.as_bytes()).unwrap();
+        let folder = SceneFolder::of(root, &scene.id);
+        let mut dataset = DatasetFile {
+            format: FORMAT.to_owned(),
+            name: String::new(),
+            version: String::new(),
+            tool: String::new(),
+            scenes: vec![scene.id.clone()],
+            photo_renderer: None,
+            licences: Vec::new(),
+            geometry: None,
+            manifest_sha256: String::new(),
+        };
+        let found = |dataset: &DatasetFile| {
+            let mut faults = Faults::default();
+            check_scorer(root, &folder, dataset, &scene, &mut faults);
+            let in_scene = |file: &str| file.strip_prefix(&format!("scenes/{}/", scene.id)).unwrap().to_owned();
+            let short = |fault: Finding| format!("{} {}{}", fault.code, in_scene(&fault.file), fault.place);
+            faults.all.into_iter().map(short).collect::<Vec<_>>()
+        };
+        std::fs::create_dir_all(folder.truth()).unwrap();
+        std::fs::write(folder.lights(), "one lamp").unwrap();
+        manifest::write(root).unwrap();
+        assert_eq!(found(&dataset), [""; 0], "nothing is rendered yet");
+        dataset.photo_renderer = Some(RendererId::new("builtin").unwrap());
+        assert_eq!(found(&dataset), ["missing_reference ground_truth/renders/scorer"]);
+
+        let picture = folder.scorer().join("input/group_00.exr");
+        std::fs::create_dir_all(picture.parent().unwrap()).unwrap();
+        std::fs::write(&picture, "light").unwrap();
+        assert_eq!(found(&dataset), ["stale_reference ground_truth/renders/scorer/scorer.json"]);
+        let file = ScorerFile {
+            format: SCORER_FORMAT.to_owned(),
+            version: 1,
+            inputs_sha256: light_inputs_sha256(root, &scene.id).unwrap(),
+            samples_each_half: 1,
+            seeds: Default::default(),
+            lights: vec!["lamp".to_owned()],
+            variance: BTreeMap::new(),
+            files: [("input/group_00.exr".to_owned(), manifest::sha256_of_bytes(b"light"))].into(),
+        };
+        json::write(&folder.scorer().join(SCORER_JSON), &file).unwrap();
+        assert_eq!(found(&dataset), [""; 0]);
+        manifest::write(root).unwrap();
+        assert_eq!(found(&dataset), [""; 0], "the reference is no input of itself");
+
+        std::fs::write(&picture, "other light").unwrap();
+        std::fs::write(folder.lights(), "two lamps").unwrap();
+        manifest::write(root).unwrap();
+        let stale = ["scorer.json/inputs_sha256", "input/group_00.exr"];
+        assert_eq!(found(&dataset), stale.map(|file| format!("stale_reference ground_truth/renders/scorer/{file}")));
+        std::fs::remove_file(&picture).unwrap();
+        assert_eq!(found(&dataset).len(), 2, "a missing picture");
     }
 }

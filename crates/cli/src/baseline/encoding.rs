@@ -9,12 +9,9 @@ use mateval_baselines::encoding_fit::{FittedEncoding, LEAST_EXPLAINED, Verdict, 
 use mateval_baselines::encoding_report::{self, EncodingReport, MapEncoding, Reading};
 use mateval_scene::json;
 
-use crate::bars::with_progress;
-use crate::format::Format;
-use crate::open_dataset::open_dataset;
-use crate::outcome::{Outcome, print};
+use crate::arguments::{Format, open_dataset};
+use crate::terminal::{Outcome, print, with_progress};
 
-/// Arguments of `encoding`.
 #[derive(clap::Args)]
 pub struct EncodingArgs {
     /// Folder of a method's pictures.
@@ -30,19 +27,21 @@ pub struct EncodingArgs {
     format: Format,
 }
 
-/// Compares the pictures with the truth; the answer is no where a map contradicts the adapter.
-pub fn run(args: &EncodingArgs) -> anyhow::Result<Outcome> {
-    let adapter = Adapter::find(&args.adapter)?;
-    if !args.folder.is_dir() {
-        bail!("'{}' does not exist; expected a folder of a method's pictures", args.folder.display());
+impl EncodingArgs {
+    /// Compares the pictures with the truth; the answer is no where a map contradicts the adapter.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let adapter = Adapter::find(&self.adapter)?;
+        if !self.folder.is_dir() {
+            bail!("'{}' does not exist; expected a folder of a method's pictures", self.folder.display());
+        }
+        let dataset = open_dataset(&self.dataset)?;
+        let report = with_progress(|progress| encoding_report::report(&dataset, &self.folder, &adapter, progress))?;
+        match self.format {
+            Format::Json => print(&json::to_text(&report))?,
+            Format::Text => print(&text(&report))?,
+        }
+        Ok(if report.agrees { Outcome::Good } else { Outcome::No })
     }
-    let dataset = open_dataset(&args.dataset)?;
-    let report = with_progress(|progress| encoding_report::report(&dataset, &args.folder, &adapter, progress))?;
-    match args.format {
-        Format::Json => print(&json::to_text(&report))?,
-        Format::Text => print(&text(&report))?,
-    }
-    Ok(if report.agrees { Outcome::Good } else { Outcome::No })
 }
 
 /// For each map the verdict, then a line for each encoding.

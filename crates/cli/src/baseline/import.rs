@@ -9,12 +9,9 @@ use mateval_baselines::submission::Method;
 use mateval_scene::material::MaterialParameter;
 use mateval_scene::{PartSetId, json};
 
-use super::places::Places;
-use crate::bars::with_progress;
-use crate::format::Format;
-use crate::outcome::{Outcome, print, say};
+use crate::arguments::{Format, Places};
+use crate::terminal::{Outcome, print, say, with_progress};
 
-/// Arguments of `import`.
 #[derive(clap::Args)]
 pub struct ImportArgs {
     /// Folder with `<scene>/<instance>.glb` or `<scene>.glb` (.gltf and .obj too), or with `<scene>.json`, which has one
@@ -37,33 +34,35 @@ pub struct ImportArgs {
     format: Format,
 }
 
-/// Makes the submission and reports how much of each surface the files cover.
-pub fn run(args: &ImportArgs) -> anyhow::Result<Outcome> {
-    let max_distance_m = args.max_distance;
-    if !(max_distance_m.is_finite() && max_distance_m > 0.0) {
-        bail!("--max-distance {max_distance_m}: expected more than 0 m");
+impl ImportArgs {
+    /// Makes the submission and reports how much of each surface the files cover.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let max_distance_m = self.max_distance;
+        if !(max_distance_m.is_finite() && max_distance_m > 0.0) {
+            bail!("--max-distance {max_distance_m}: expected more than 0 m");
+        }
+        let options = ImportOptions { max_distance_m, part_set: self.part_set.clone() };
+        let description = format!(
+            "{}'s own meshes, uv or parts, rebaked to the atlases where they lie within {max_distance_m} m",
+            self.method
+        );
+        let (places, method) = (&self.places, Method::new(&self.method, &description));
+        let dataset = places.open()?;
+        let report = with_progress(|progress| {
+            import::write(&dataset, &self.folder, &places.out, places.force, &method, &options, progress)
+        })?;
+        for file in &report.unused {
+            say(&format!("warning: '{file}' matches no scene or instance of the dataset; it was not read"));
+        }
+        for note in report.scenes.iter().flat_map(|scene| moves(&scene.instances)) {
+            say(&note);
+        }
+        match self.format {
+            Format::Json => print(&json::to_text(&report))?,
+            Format::Text => print(&text(&report))?,
+        }
+        Ok(Outcome::Good)
     }
-    let options = ImportOptions { max_distance_m, part_set: args.part_set.clone() };
-    let description = format!(
-        "{}'s own meshes, uv or parts, rebaked to the atlases where they lie within {max_distance_m} m",
-        args.method
-    );
-    let (places, method) = (&args.places, Method::new(&args.method, &description));
-    let dataset = places.open()?;
-    let report = with_progress(|progress| {
-        import::write(&dataset, &args.folder, &places.out, places.force, &method, &options, progress)
-    })?;
-    for file in &report.unused {
-        say(&format!("warning: '{file}' matches no scene or instance of the dataset; it was not read"));
-    }
-    for note in report.scenes.iter().flat_map(|scene| moves(&scene.instances)) {
-        say(&note);
-    }
-    match args.format {
-        Format::Json => print(&json::to_text(&report))?,
-        Format::Text => print(&text(&report))?,
-    }
-    Ok(Outcome::Good)
 }
 
 /// A line for each file whose mesh was moved.

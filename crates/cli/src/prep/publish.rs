@@ -1,18 +1,20 @@
-//! `mateval prep publish`: a dataset as a public and a withheld folder, and the report of its release.
+//! The commands that pass a dataset on: `mateval prep publish`, `export` and `mitsuba`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use mateval_audit::mitsuba_export::{self, export_view};
 use mateval_audit::publish::publish;
+use mateval_export::{ExportOptions, Exported, Format, croissant, export};
 use mateval_release::publication::Day;
 use mateval_release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
 use mateval_scene::work_folder::is_inside;
+use mateval_scene::{SceneId, Severity, ViewId};
 
-use crate::bars::with_progress;
-use crate::outcome::{Outcome, counted, print};
-use crate::tool::TOOL;
+use crate::TOOL;
+use crate::prep::make::samples_parser;
+use crate::terminal::{Outcome, counted, print, say, with_progress};
 
-/// Arguments of `prep publish`.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("what").args(["withhold", "report"]).required(true).multiple(true))]
 pub struct PublishArgs {
@@ -71,22 +73,24 @@ enum Withheld {
     GroundTruth,
 }
 
-/// Checks what is given for the report, then splits the dataset and prints the commitment, a hash of the withheld files,
-/// then writes the report.
-pub fn run(args: &PublishArgs) -> anyhow::Result<Outcome> {
-    let options = release_options(args);
-    let halves = halves(args)?;
-    if let Some(options) = &options {
-        check_report(options, &halves)?;
+impl PublishArgs {
+    /// Checks what is given for the report, then splits the dataset and prints the commitment, a hash of the withheld files,
+    /// then writes the report.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let options = release_options(self);
+        let halves = halves(self)?;
+        if let Some(options) = &options {
+            check_report(options, &halves)?;
+        }
+        let release = options.as_ref().map(CheckedRelease::new).transpose().context("cannot report on the release")?;
+        if let Some([public, private]) = halves {
+            split(self, public, private)?;
+        }
+        let Some(release) = release else { return Ok(Outcome::Good) };
+        let file = with_progress(|progress| release.write(TOOL, progress)).context("cannot report on the release")?;
+        print(&summary(self, &file))?;
+        Ok(if file.is_good() { Outcome::Good } else { Outcome::No })
     }
-    let release = options.as_ref().map(CheckedRelease::new).transpose().context("cannot report on the release")?;
-    if let Some([public, private]) = halves {
-        split(args, public, private)?;
-    }
-    let Some(release) = release else { return Ok(Outcome::Good) };
-    let file = with_progress(|progress| release.write(TOOL, progress)).context("cannot report on the release")?;
-    print(&summary(args, &file))?;
-    Ok(if file.is_good() { Outcome::Good } else { Outcome::No })
 }
 
 fn release_options(args: &PublishArgs) -> Option<ReleaseOptions> {
@@ -155,4 +159,125 @@ fn summary(args: &PublishArgs, file: &ReleaseFile) -> String {
         _ => format!("renderers agree on {agree} of {given} compared scenes"),
     };
     format!("{}: {}, {verdict}; {compared}\n", place.display(), counted(all, "scene"))
+}
+
+#[derive(clap::Args)]
+pub struct ExportArgs {
+    /// Folder of the dataset.
+    dataset: PathBuf,
+    /// The format to write.
+    #[arg(long = "as", value_enum, value_name = "FORMAT")]
+    format: FormatName,
+    /// Folder to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// For croissant: the address of the folder where the files will be published; without it their places are relative.
+    #[arg(long)]
+    url: Option<String>,
+    /// For croissant: the day of publication, as in 2026-11-24.
+    #[arg(long)]
+    date: Option<String>,
+    /// For croissant: how to cite the dataset [default: its name, version and hash].
+    #[arg(long)]
+    citation: Option<String>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum FormatName {
+    /// One tar for each scene and base.tar for the rest, so that scenes can be downloaded one by one.
+    Tar,
+    /// The same tars, described by a Croissant file.
+    Croissant,
+    /// A Parquet file with a row for each view, and a dataset card for the Hugging Face Hub.
+    Huggingface,
+    /// For each scene a folder with transforms.json.
+    Nerfstudio,
+    /// For each scene a folder with COLMAP's text model.
+    Colmap,
+}
+
+impl FormatName {
+    fn format(self) -> Format {
+        match self {
+            Self::Tar => Format::Tar,
+            Self::Croissant => Format::Croissant,
+            Self::Huggingface => Format::Huggingface,
+            Self::Nerfstudio => Format::Nerfstudio,
+            Self::Colmap => Format::Colmap,
+        }
+    }
+}
+
+impl ExportArgs {
+    /// Exports the dataset and prints what was written.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let options = ExportOptions {
+            dataset: self.dataset.clone(),
+            format: self.format.format(),
+            out: self.out.clone(),
+            publication: croissant::Publication {
+                url: self.url.clone(),
+                date: self.date.clone(),
+                citation: self.citation.clone(),
+            },
+        };
+        let Exported { scenes, views, without_picture } =
+            with_progress(|progress| export(&options, progress)).context("cannot export the dataset")?;
+        let mut line = format!("{}: {}", self.out.display(), counted(scenes, "scene"));
+        if let Some(views) = views {
+            line.push_str(&format!(", {}", counted(views, "view")));
+        }
+        if without_picture > 0 {
+            line.push_str(&format!(
+                "; {} without a picture, because theirs is withheld",
+                counted(without_picture, "view")
+            ));
+        }
+        print(&format!("{line}\n"))?;
+        Ok(Outcome::Good)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct MitsubaArgs {
+    /// Folder of the dataset.
+    dataset: PathBuf,
+    /// The scene to export.
+    #[arg(long)]
+    scene: SceneId,
+    /// The view to export.
+    #[arg(long, default_value = "input")]
+    view: ViewId,
+    /// Folder that scene.xml, meshes and textures are written to.
+    #[arg(long)]
+    out: PathBuf,
+    /// Samples per pixel [default: the recipe's].
+    #[arg(long, value_parser = samples_parser())]
+    samples: Option<u32>,
+    /// Replace a folder that already exists.
+    #[arg(long)]
+    force: bool,
+}
+
+impl MitsubaArgs {
+    /// Exports the view and reports what Mitsuba cannot express.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let options = mitsuba_export::ExportOptions {
+            dataset: self.dataset.clone(),
+            scene: self.scene.clone(),
+            view: self.view.clone(),
+            samples: self.samples,
+            out: self.out.clone(),
+            force: self.force,
+        };
+        let findings = export_view(&options).context("cannot export to Mitsuba")?;
+        for finding in &findings {
+            say(&format!("{}: {finding}", self.scene));
+        }
+        let differences = findings.iter().filter(|finding| finding.severity != Severity::Note).count();
+        let verdict = if differences == 0 { "means the same" } else { "does NOT mean the same" };
+        let file = self.out.join("scene.xml");
+        print(&format!("{}: {verdict} in Mitsuba, {}\n", file.display(), counted(differences, "difference")))?;
+        Ok(if differences == 0 { Outcome::Good } else { Outcome::No })
+    }
 }

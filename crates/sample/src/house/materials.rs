@@ -1,9 +1,10 @@
 //! The materials of floors, walls and fittings, and their textures, whose letters and arrows show their orientation. Some
 //! textures are stored mirrored or rotated, which their materials' `UVTransform` undoes.
+//!
+//! The texture of a piece of furniture has up to four fields, two by two. An unused field has opacity 0, as in the data.
 
 use mateval_image::Picture;
 
-use super::font::Lettering;
 use crate::pattern::{self, Color, noise, paint, random};
 
 pub struct ArchitectureMaterial {
@@ -159,6 +160,144 @@ fn door_wood(u: f64, v: f64) -> Color {
     pattern::wood(v, u).map(|c| 0.42 + 0.6 * c - speck)
 }
 
+/// The content of one field of a model's texture.
+#[derive(Clone, Copy, Debug)]
+pub enum Swatch {
+    /// Wood of this colour with its grain along u.
+    Wood(Color),
+    /// A weave of this colour.
+    Fabric(Color),
+    /// A smooth surface such as metal, paint or a lampshade.
+    Plain(Color),
+    /// Dark letters on this colour that fill the field, for a surface `aspect` times as wide as high.
+    Text { lines: &'static [&'static str], ground: Color, ink: Color, aspect: f64 },
+}
+
+impl Swatch {
+    /// The colour at a point of the field, v downwards.
+    fn color(&self, u: f64, v: f64) -> Color {
+        match *self {
+            Self::Wood(tone) => {
+                let light = pattern::wood(u, v)[1] / 0.33;
+                tone.map(|c| c * (0.65 + 0.35 * light))
+            }
+            Self::Fabric(tone) => {
+                let light = pattern::fabric(u, v)[1] / 0.40;
+                tone.map(|c| c * (0.7 + 0.3 * light))
+            }
+            Self::Plain(tone) => tone.map(|c| c * (0.97 + 0.06 * noise(u, v, 16, 16, 41))),
+            Self::Text { lines, ground, ink, aspect } => {
+                let edge = u.min(1.0 - u).min(v.min(1.0 - v));
+                if edge > 0.03 && edge < 0.05 || Lettering::fitted(lines, [0.1; 2], [0.9; 2], aspect).covers(u, v) {
+                    ink
+                } else {
+                    ground.map(|c| c * (0.97 + 0.06 * noise(u, v, 24, 24, 42)))
+                }
+            }
+        }
+    }
+}
+
+/// The texture of a model, `side` texels wide and high.
+pub fn swatch_picture(swatches: &[Swatch], side: usize) -> Picture<[u8; 4]> {
+    let half = side / 2;
+    Picture::from_fn(side, side, |x, y| {
+        let Some(swatch) = swatches.get(x / half + 2 * (y / half)) else { return [128, 128, 128, 0] };
+        let at = |texel: usize| (texel % half) as f64 / half as f64 + 0.5 / half as f64;
+        let [r, g, b] = swatch.color(at(x), at(y)).map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+        [r, g, b, 255]
+    })
+}
+
+/// The lower left corner and the width of a field in texture coordinates, v upwards, inset by two texels on every side.
+pub fn swatch_field(number: usize, side: usize) -> ([f64; 2], f64) {
+    let inset = 2.0 / side as f64;
+    let (column, row) = ((number % 2) as f64, (number / 2) as f64);
+    ([column / 2.0 + inset, 0.5 - row / 2.0 + inset], 0.5 - 2.0 * inset)
+}
+
+/// Dots from the left edge of a letter to that of the next.
+const ADVANCE: usize = 6;
+/// Dots from the top of a line to that of the next.
+const LINE: usize = 9;
+
+/// Characters and their rows from the top. Bit 4 of a row is the leftmost dot.
+const GLYPHS: [(char, [u8; 7]); 29] = [
+    ('A', [0x0e, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11]),
+    ('B', [0x1e, 0x11, 0x11, 0x1e, 0x11, 0x11, 0x1e]),
+    ('C', [0x0e, 0x11, 0x10, 0x10, 0x10, 0x11, 0x0e]),
+    ('D', [0x1e, 0x11, 0x11, 0x11, 0x11, 0x11, 0x1e]),
+    ('E', [0x1f, 0x10, 0x10, 0x1e, 0x10, 0x10, 0x1f]),
+    ('F', [0x1f, 0x10, 0x10, 0x1e, 0x10, 0x10, 0x10]),
+    ('G', [0x0e, 0x11, 0x10, 0x17, 0x11, 0x11, 0x0f]),
+    ('H', [0x11, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11]),
+    ('I', [0x0e, 0x04, 0x04, 0x04, 0x04, 0x04, 0x0e]),
+    ('J', [0x07, 0x02, 0x02, 0x02, 0x02, 0x12, 0x0c]),
+    ('K', [0x11, 0x12, 0x14, 0x18, 0x14, 0x12, 0x11]),
+    ('L', [0x10, 0x10, 0x10, 0x10, 0x10, 0x10, 0x1f]),
+    ('M', [0x11, 0x1b, 0x15, 0x15, 0x11, 0x11, 0x11]),
+    ('N', [0x11, 0x11, 0x19, 0x15, 0x13, 0x11, 0x11]),
+    ('O', [0x0e, 0x11, 0x11, 0x11, 0x11, 0x11, 0x0e]),
+    ('P', [0x1e, 0x11, 0x11, 0x1e, 0x10, 0x10, 0x10]),
+    ('Q', [0x0e, 0x11, 0x11, 0x11, 0x15, 0x12, 0x0d]),
+    ('R', [0x1e, 0x11, 0x11, 0x1e, 0x14, 0x12, 0x11]),
+    ('S', [0x0f, 0x10, 0x10, 0x0e, 0x01, 0x01, 0x1e]),
+    ('T', [0x1f, 0x04, 0x04, 0x04, 0x04, 0x04, 0x04]),
+    ('U', [0x11, 0x11, 0x11, 0x11, 0x11, 0x11, 0x0e]),
+    ('V', [0x11, 0x11, 0x11, 0x11, 0x11, 0x0a, 0x04]),
+    ('W', [0x11, 0x11, 0x11, 0x15, 0x15, 0x1b, 0x11]),
+    ('X', [0x11, 0x11, 0x0a, 0x04, 0x0a, 0x11, 0x11]),
+    ('Y', [0x11, 0x11, 0x0a, 0x04, 0x04, 0x04, 0x04]),
+    ('Z', [0x1f, 0x01, 0x02, 0x04, 0x08, 0x10, 0x1f]),
+    ('^', [0x04, 0x0e, 0x15, 0x04, 0x04, 0x04, 0x04]),
+    ('>', [0x00, 0x04, 0x02, 0x1f, 0x02, 0x04, 0x00]),
+    ('_', [0x04, 0x04, 0x04, 0x04, 0x15, 0x0e, 0x04]),
+];
+
+/// Whether the dot at `column`, `row` of a line of text is inked. `^`, `>` and `_` are arrows up, right and down. A
+/// character without a glyph is blank.
+fn is_inked(line: &str, column: usize, row: usize) -> bool {
+    let glyph = line.chars().nth(column / ADVANCE).and_then(|letter| GLYPHS.iter().find(|(known, _)| *known == letter));
+    let (dot, rows) = (column % ADVANCE, 7);
+    glyph.is_some_and(|(_, bits)| dot < 5 && row < rows && bits[row] & (0x10 >> dot) != 0)
+}
+
+/// Text in a picture. Lengths are fractions of the picture, measured from its upper left corner.
+#[derive(Clone, Copy, Debug)]
+pub struct Lettering {
+    /// Lines from the top down.
+    pub lines: &'static [&'static str],
+    /// Upper left corner of the first letter.
+    pub at: [f64; 2],
+    /// Width and height of a dot.
+    pub dot: [f64; 2],
+}
+
+impl Lettering {
+    /// Text in the middle of the rectangle from `low` to `high`, as large as fits with square dots. `aspect` is the width
+    /// of the surface that shows the picture divided by its height.
+    pub fn fitted(lines: &'static [&'static str], low: [f64; 2], high: [f64; 2], aspect: f64) -> Self {
+        let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(1);
+        let columns = (longest * ADVANCE - 1) as f64;
+        let rows = (lines.len() * LINE - 2) as f64;
+        let size = ((high[0] - low[0]) / columns).min((high[1] - low[1]) / aspect / rows);
+        let dot = [size, size * aspect];
+        let left = (low[0] + high[0] - columns * dot[0]) / 2.0;
+        let top = (low[1] + high[1] - rows * dot[1]) / 2.0;
+        Self { lines, at: [left, top], dot }
+    }
+
+    /// Whether a point of the picture is inked.
+    pub fn covers(&self, u: f64, v: f64) -> bool {
+        let (x, y) = ((u - self.at[0]) / self.dot[0], (v - self.at[1]) / self.dot[1]);
+        if x < 0.0 || y < 0.0 {
+            return false;
+        }
+        let (column, row) = (x as usize, y as usize);
+        self.lines.get(row / LINE).is_some_and(|line| is_inked(line, column, row % LINE))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DMat3, DVec3};
@@ -216,5 +355,27 @@ mod tests {
             assert!(changed(|x, y, n| (x, n - 1 - y)) > n * n / 200, "{}", texture.name);
             assert!(changed(|x, y, n| (n - 1 - x, n - 1 - y)) > n * n / 200, "{}", texture.name);
         }
+    }
+
+    #[test]
+    fn letters_fill_their_rectangle() {
+        let text = Lettering::fitted(&["L"], [0.0, 0.0], [1.0, 1.0], 5.0 / 7.0);
+        // An L has a stroke down the left, a foot to the right, and nothing above the foot.
+        assert!(text.covers(0.1, 0.1) && text.covers(0.9, 0.95) && !text.covers(0.9, 0.1));
+        assert!(!text.covers(-0.1, 0.1) && !text.covers(0.1, 1.1));
+    }
+
+    /// A mirrored text differs from the text. The twin is a letter that is its own mirror image.
+    #[test]
+    fn asymmetric_words_change_under_a_mirror() {
+        let differs = |lines: &'static [&'static str]| {
+            let text = Lettering::fitted(lines, [0.0; 2], [1.0; 2], 1.0);
+            (0..900).any(|i| {
+                let (u, v) = (f64::from(i % 30) / 30.0 + 0.017, f64::from(i / 30) / 30.0 + 0.017);
+                text.covers(u, v) != text.covers(1.0 - u, v)
+            })
+        };
+        assert!([&["MATEVAL"], &["N"], &["BED ^"], &["X>"]].into_iter().all(|lines| differs(lines)));
+        assert!(!differs(&["H"]));
     }
 }

@@ -5,20 +5,18 @@ use std::path::Path;
 
 use mateval_image::Picture;
 use mateval_image::png_io::{write_grey_alpha_bytes, write_rgba_bytes};
-use mateval_sample::house::house_json::number;
-use mateval_sample::house::plan::House;
-use mateval_sample::house::swatches;
+use mateval_sample::house::files::number;
+use mateval_sample::house::layout::House;
+use mateval_sample::house::materials::swatch_picture;
 use serde_json::{Value, json};
 
 /// The location of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// In the house's JSON.
     Json {
         /// JSON pointer (RFC 6901).
         pointer: &'static str,
     },
-    /// In a file.
     File {
         /// Path relative to the house's folder.
         path: &'static str,
@@ -226,7 +224,7 @@ pub(super) fn damage_files(house: &House, root: &Path) {
 fn damage_texture(house: &House, name: &str, path: &Path) {
     let jid = path.parent().unwrap().file_name().unwrap().to_str().unwrap();
     let model = house.models.iter().find(|model| model.jid() == jid).unwrap();
-    let picture = swatches::picture(&model.swatches, model.side);
+    let picture = swatch_picture(&model.swatches, model.side);
     match name {
         "texture_alpha_zero" => write_rgba_bytes(path, &picture.map(|[r, g, b, _]| [r, g, b, 0])).unwrap(),
         "texture_grey_alpha" => write_grey_alpha_bytes(path, &picture.map(|[r, _, _, a]| [r, a])).unwrap(),

@@ -1,0 +1,507 @@
+//! Shows the comparison: as tables, whose numbers are rounded while the JSON has all digits, and as a page with the pictures
+//! of both renderers side by side and their difference, as 8-bit PNG.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::png_io::write_rgb_bytes;
+use mateval_image::transfer::byte_from_unit;
+use mateval_image::{LinearRgb, Normal, Picture};
+use mateval_scene::ViewId;
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::text_table::{Table, row};
+use minijinja::value::Serde;
+use minijinja::{Environment, context};
+use serde::Serialize;
+
+use super::file::{
+    Check, CompareFile, LightComparison, Quantity, SceneComparison, SourceComparison, State, ViewComparison,
+};
+use super::geometry::{OurGeometry, TheirGeometry, angle_deg, away_from_edges};
+use super::light::{Halves, ShownKinds, difference};
+use crate::AuditError;
+
+/// The tables, then every check that does not agree, then the verdict.
+pub fn text(file: &CompareFile) -> String {
+    let tables =
+        [geometry(file), light(file), apart(file), source_materials(file)].map(|table| table.text()).join("\n");
+    let faults: String = faults(file).iter().map(|fault| format!("{fault}\n")).collect();
+    let gap = if faults.is_empty() { "" } else { "\n" };
+    format!("{tables}{gap}{faults}\n{}\n", verdict(file))
+}
+
+/// One line for every check that does not agree.
+pub fn faults(file: &CompareFile) -> Vec<String> {
+    let faults = file.checks().filter(|(_, _, check)| check.state != State::Agrees);
+    faults.map(|(scene, view, check)| format!("{scene} {view}: {check}")).collect()
+}
+
+/// The verdict in one line.
+pub fn verdict(file: &CompareFile) -> String {
+    if file.scenes.is_empty() {
+        return "nothing was compared: every scene has a photo from elsewhere".to_owned();
+    }
+    let count = |state: State| file.checks().filter(|(_, _, check)| check.state == state).count();
+    let all = file.checks().count();
+    let others = [
+        (State::Differs, "differ"),
+        (State::TooNoisy, "too noisy"),
+        (State::Undecided, "undecided"),
+        (State::Missing, "missing"),
+        (State::Unreadable, "unreadable"),
+    ];
+    let others = others.into_iter().map(|(state, word)| (count(state), word)).filter(|(count, _)| *count > 0);
+    let others: Vec<String> = others.map(|(count, word)| format!("{count} {word}")).collect();
+    let rest = if others.is_empty() { String::new() } else { format!(", {}", others.join(", ")) };
+    let verdict = if file.agrees { "agrees" } else { "does NOT agree" };
+    format!(
+        "{} {verdict} with the built-in tracer: {} of {all} checks agree{rest}",
+        file.renderer,
+        count(State::Agrees)
+    )
+}
+
+fn views(file: &CompareFile) -> impl Iterator<Item = (&SceneComparison, &ViewComparison)> {
+    file.scenes.iter().flat_map(|scene| scene.views.iter().map(move |view| (scene, view)))
+}
+
+fn geometry(file: &CompareFile) -> Table {
+    let mut rows = vec![row(["scene", "view", "base colour", "instances", "parts", "depth", "normals", "group sums"])];
+    for (scene, view) in views(file) {
+        let cell = |picture: &str, quantity: Quantity, unit: &dyn Fn(f64) -> String| {
+            let check = view.check(picture, quantity);
+            let other = || view.checks.iter().find(|check| check.picture == picture || check.picture == "render");
+            check.or_else(other).map_or_else(|| "none".to_owned(), |check| shown(check, unit))
+        };
+        let share = |share: f64| format!("{:.2} %", 100.0 * share);
+        let sums = ["rgb_a", "rgb_b"].map(|half| view.check(half, Quantity::GroupSum).and_then(|check| check.measured));
+        let sum =
+            sums.into_iter().flatten().fold(None, |most: Option<f64>, sum| Some(most.map_or(sum, |m| m.max(sum))));
+        rows.push(row([
+            scene.scene.as_str(),
+            view.view.as_str(),
+            &cell("base_color", Quantity::PsnrDb, &|db| format!("{db:.1} dB")),
+            &cell("instance", Quantity::EqualShare, &share),
+            &cell("part", Quantity::EqualShare, &share),
+            &cell("depth", Quantity::MedianM, &|m| format!("{:.3} mm", 1e3 * m)),
+            &cell("normal", Quantity::MedianDeg, &|deg| format!("{deg:.2} deg")),
+            &sum.map_or_else(|| "none".to_owned(), |sum| format!("{sum:.0e}")),
+        ]));
+    }
+    Table { title: "Pictures without light, and whether a half's groups sum to it".to_owned(), words: 2, rows }
+}
+
+fn shown(check: &Check, unit: &dyn Fn(f64) -> String) -> String {
+    let mark = if check.state == State::Differs { "!" } else { "" };
+    check.measured.map_or_else(|| check.state.word().to_owned(), |measured| unit(measured) + mark)
+}
+
+fn light(file: &CompareFile) -> Table {
+    let head =
+        ["scene", "view", "picture", "state", "mean off", "error", "over", "tiles", "allowed", "apart", "median"];
+    let mut rows = vec![row(head)];
+    rows[0].push("noise".to_owned());
+    for (scene, view) in views(file) {
+        for light in &view.light {
+            let words = [scene.scene.as_str(), view.view.as_str(), &name(light), state(view, light).word()];
+            let [off, error] = light.mean.map_or([None; 2], |mean| [mean.difference, mean.standard_error]);
+            let off = off.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
+            let apart = light.apart.iter().map(|apart| apart.count).sum::<usize>();
+            let counts = [light.tiles.over, light.tiles.count, light.tiles.allowed, apart];
+            let noise = light.tiles.noise.map_or_else(|| "none".to_owned(), |noise| format!("{noise:.1}"));
+            let mut cells = row(words);
+            cells.extend([off, percent(error)]);
+            cells.extend(counts.map(|count| count.to_string()));
+            cells.extend([percent(light.tiles.median), noise]);
+            rows.push(cells);
+        }
+    }
+    let mut bounds: Vec<f64> = file.scenes.iter().map(|scene| scene.tile_bound).collect();
+    bounds.sort_by(f64::total_cmp);
+    bounds.dedup();
+    let bounds: Vec<String> = bounds.iter().map(|bound| format!("{} %", 100.0 * bound)).collect();
+    let title = format!(
+        "Pictures of light. mean off: difference of the means, error: its standard error; over: tiles off by more than {} \
+         plus 3 standard errors; apart: tiles that do not count; noise: 3 standard errors of a tile / bound",
+        bounds.join(" or ")
+    );
+    Table { title, words: 4, rows }
+}
+
+/// The worse state of the picture's two checks.
+fn state(view: &ViewComparison, light: &LightComparison) -> State {
+    let state = |quantity| view.check(&light.picture, quantity).map_or(State::Undecided, |check| check.state);
+    let states = [state(Quantity::TilesOver), state(Quantity::MeanDifference)];
+    let order = [State::Differs, State::TooNoisy, State::Undecided];
+    order.into_iter().find(|state| states.contains(state)).unwrap_or(State::Agrees)
+}
+
+fn name(light: &LightComparison) -> String {
+    match &light.light {
+        Some(name) => format!("{} {}", light.picture, crate::stats::shown(name, 24)),
+        None => light.picture.clone(),
+    }
+}
+
+/// The tiles of RGB that do not count for the verdict.
+fn apart(file: &CompareFile) -> Table {
+    let mut rows = vec![row(["scene", "view", "kind", "tiles", "over", "median", "largest"])];
+    for (scene, view) in views(file) {
+        for apart in view.light.iter().filter(|light| light.light.is_none()).flat_map(|light| &light.apart) {
+            rows.push(row([
+                scene.scene.as_str(),
+                view.view.as_str(),
+                apart.kind.word(),
+                &apart.count.to_string(),
+                &apart.over.to_string(),
+                &percent(apart.median),
+                &apart.largest.map_or_else(|| "none".to_owned(), |off| format!("{:+.1} %", 100.0 * off)),
+            ]));
+        }
+    }
+    Table {
+        title: "Tiles of RGB that show materials known to differ; they do not count for the verdict".to_owned(),
+        words: 3,
+        rows,
+    }
+}
+
+/// The same for one scene in one sentence.
+pub(super) fn source_sentence(source: &SourceComparison) -> String {
+    let psnr = source.psnr_db.map_or_else(|| "no error above the noise".to_owned(), |db| format!("{db:.1} dB"));
+    let mean = source.light.mean.and_then(|mean| mean.difference);
+    let mean = mean.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
+    format!("The source's own materials against the converted ones in {}: {psnr}, mean off {mean}", source.view)
+}
+
+/// How far the converted materials are from the source's own.
+fn source_materials(file: &CompareFile) -> Table {
+    let mut rows = vec![row(["scene", "view", "PSNR", "mean off", "tiles", "over", "median", "worst"])];
+    for scene in &file.scenes {
+        let Some(source) = &scene.source_materials else { continue };
+        let signed = |off: Option<f64>| off.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
+        let tiles = &source.light.tiles;
+        rows.push(row([
+            scene.scene.as_str(),
+            source.view.as_str(),
+            &source.psnr_db.map_or_else(|| "none".to_owned(), |db| format!("{db:.1} dB")),
+            &signed(source.light.mean.and_then(|mean| mean.difference)),
+            &tiles.count.to_string(),
+            &tiles.over.to_string(),
+            &percent(tiles.median),
+            &signed(tiles.worst.and_then(|worst| worst.off.difference)),
+        ]));
+    }
+    let title = "The source's own materials against the converted ones, both by the built-in tracer; no check";
+    Table { title: title.to_owned(), words: 2, rows }
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "none".to_owned(), |share| format!("{:.2} %", 100.0 * share))
+}
+
+const TEMPLATE: &str = include_str!("page.j2");
+
+/// HTML with the verdict, the checks that do not agree and the pictures of each view; `previews` contains one list per
+/// scene.
+pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String {
+    let scenes: Vec<_> = file
+        .scenes
+        .iter()
+        .zip(previews)
+        .map(|(scene, previews)| {
+            let views: Vec<_> = scene
+                .views
+                .iter()
+                .map(|view| {
+                    let shown = previews.iter().find(|shown| shown.view == view.view.as_str());
+                    let agrees = view.checks.iter().all(|check| check.state == State::Agrees);
+                    context! { view => view.view.as_str(), agrees, checks => Serde(&view.checks), shown => Serde(shown) }
+                })
+                .collect();
+            let kinds: Vec<&str> = scene.kinds.iter().map(|kind| kind.word()).collect();
+            context! {
+                scene => scene.scene.as_str(), kinds, views,
+                tile_bound => 100.0 * scene.tile_bound, samples => scene.samples_each_half,
+                source => scene.source_materials.as_ref().map(source_sentence),
+            }
+        })
+        .collect();
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| minijinja::AutoEscape::Html);
+    let text = environment.render_str(
+        TEMPLATE,
+        context! {
+            tool => &file.tool, renderer => &file.renderer, dataset => Serde(&file.dataset), agrees => file.agrees,
+            verdict => verdict(file), faults => faults(file), scenes,
+        },
+    );
+    text.expect("the template uses only values that the context holds")
+}
+
+/// Ends of the scale of differences. Of a pixel of light: relative to the picture's mean over valid pixels that decide.
+const LIGHT_PIXEL: f64 = 0.5;
+/// Of a tile of light: a multiple of the bound.
+const LIGHT_TILE: f64 = 5.0;
+/// Of a base colour.
+const BASE_COLOR: f64 = 0.1;
+/// Of a depth, in metres.
+const DEPTH_M: f64 = 0.01;
+/// Of a normal, in degrees.
+const NORMAL_DEG: f64 = 5.0;
+/// The linear mean that the preview of a light group is scaled to.
+const GROUP_MEAN: f64 = 0.2;
+
+/// Colours for darker, equal and brighter than the built-in tracer's: ColorBrewer's RdBu, whose ends are distinct for
+/// colour-blind readers too.
+const DIVERGING: [[u8; 3]; 3] = [[33, 102, 172], [247, 247, 247], [178, 24, 43]];
+/// Colour of tiles that do not count for the verdict, and of pixels at edges.
+const APART: [u8; 3] = [150, 150, 150];
+
+/// The previews of a view.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct ViewPreviews {
+    #[serde(skip)]
+    out: PathBuf,
+    /// Folder of the pictures, relative to the page.
+    folder: String,
+    #[serde(skip)]
+    exposure: f64,
+    pub(super) view: String,
+    /// One row per picture.
+    rows: Vec<Row>,
+}
+
+/// One picture; files are relative to the page.
+#[derive(Clone, Debug, Serialize)]
+struct Row {
+    picture: String,
+    /// How both previews were made.
+    note: String,
+    ours: String,
+    theirs: String,
+    differences: Vec<DifferencePreview>,
+}
+
+/// A signed difference.
+#[derive(Clone, Debug, Serialize)]
+struct DifferencePreview {
+    file: String,
+    title: String,
+    /// The values at the ends of the scale.
+    low: String,
+    high: String,
+}
+
+/// A picture of differences, and the labels of its scale.
+struct Shown {
+    suffix: &'static str,
+    title: String,
+    low: String,
+    high: String,
+    picture: Picture<[u8; 3]>,
+}
+
+impl ViewPreviews {
+    /// Creates the view's folder below `out`.
+    pub(super) fn new(out: &Path, scene: &SceneFile, view: &ViewId) -> Result<Self, AuditError> {
+        let folder = format!("pictures/{}/{view}", scene.id);
+        let place = out.join(&folder);
+        std::fs::create_dir_all(&place).map_err(AuditError::io("make", &place))?;
+        let (out, view) = (out.to_owned(), view.to_string());
+        Ok(Self { out, folder, exposure: scene.exposure, view, rows: Vec::new() })
+    }
+
+    /// Adds RGB or a light group: the mean of the halves, not the denoised picture.
+    pub(super) fn add_light(
+        &mut self,
+        light: &LightComparison,
+        [ours, theirs]: [&Halves; 2],
+        kinds: &ShownKinds,
+        bound: f64,
+    ) -> Result<(), AuditError> {
+        let scale = light.means[0];
+        let level = scale.iter().sum::<f64>() / 3.0;
+        let (gain, note) = self.gain(light, level);
+        let means = [ours.mean(), theirs.mean()];
+        let off = |at: usize| {
+            let [a, b] = [0, 1].map(|side: usize| grey(means[side].pixels()[at]));
+            if level > 0.0 { (b - a) / level / LIGHT_PIXEL } else { f64::from(a != b) }
+        };
+        let (width, height) = (means[0].width(), means[0].height());
+        let title = "theirs minus MatEval's, relative to MatEval's mean";
+        let by_pixel = scaled("pixels", title, 100.0 * LIGHT_PIXEL, " %", signed(width, height, off));
+        let title = format!(
+            "tiles, worst channel; dark frame: over the bound of {} %; grey frame: does not count for the verdict",
+            100.0 * bound
+        );
+        let map = tile_map((width, height), [ours, theirs], kinds, bound, scale);
+        let by_tile = scaled("tiles", &title, 100.0 * LIGHT_TILE * bound, " %", map);
+        let previews = means.map(|picture| to_bytes(&picture, gain));
+        self.add(&light.picture, note, previews, vec![by_pixel, by_tile])
+    }
+
+    /// The factor of a picture of light in its preview, and the note that states it.
+    fn gain(&self, light: &LightComparison, level: f64) -> (f64, String) {
+        match light.light.as_ref().map(|name| crate::stats::shown(name, 60)) {
+            None => (self.exposure, "mean of both halves, with the scene's exposure".to_owned()),
+            Some(name) if level > 0.0 => (GROUP_MEAN / level, format!("{name}, times {:.3}", GROUP_MEAN / level)),
+            Some(name) => (1.0, format!("{name}, black")),
+        }
+    }
+
+    /// Adds the pictures without light that Blender made.
+    pub(super) fn add_geometry(&mut self, ours: &OurGeometry, theirs: &TheirGeometry) -> Result<(), AuditError> {
+        if let Some(base_color) = &theirs.base_color {
+            self.add_base_color(ours, base_color)?;
+        }
+        if let Some(depth) = &theirs.depth {
+            self.add_depth(&ours.depth, depth)?;
+        }
+        if let Some(normal) = &theirs.normal {
+            self.add_normal(&ours.normal, normal)?;
+        }
+        let ids = [("instance", &ours.instance, &theirs.instance), ("part", &ours.part, &theirs.part)];
+        for (name, ours, theirs) in ids {
+            if let Some(theirs) = theirs {
+                self.add_ids(name, ours, theirs)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add_base_color(&mut self, ours: &OurGeometry, theirs: &Picture<LinearRgb>) -> Result<(), AuditError> {
+        let off = |at: usize| {
+            let [a, b] = [&ours.base_color, theirs].map(|picture| grey(picture.pixels()[at]));
+            if ours.valid.pixels()[at] { (b - a) / BASE_COLOR } else { 0.0 }
+        };
+        let map = signed(theirs.width(), theirs.height(), off);
+        let shown = scaled("difference", "theirs minus MatEval's, mean of channels, valid pixels", BASE_COLOR, "", map);
+        let previews = [&ours.base_color, theirs].map(|picture| to_bytes(picture, 1.0));
+        self.add("base_color", "linear values, sRGB-encoded".to_owned(), previews, vec![shown])
+    }
+
+    fn add_depth(&mut self, ours: &Picture<f32>, theirs: &Picture<f32>) -> Result<(), AuditError> {
+        let off = |at: usize| f64::from(theirs.pixels()[at] - ours.pixels()[at]) / DEPTH_M;
+        let map = signed(ours.width(), ours.height(), off);
+        let shown = scaled("difference", "theirs minus MatEval's", 1e3 * DEPTH_M, " mm", map);
+        let far = ours.pixels().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let previews = [ours, theirs].map(|picture| picture.map(|depth| [byte_from_unit(depth / far); 3]));
+        self.add("depth", format!("white is {far:.2} m"), previews, vec![shown])
+    }
+
+    fn add_normal(&mut self, ours: &Picture<Normal>, theirs: &Picture<Normal>) -> Result<(), AuditError> {
+        let off = |at: usize| {
+            let (a, b) = (ours.pixels()[at], theirs.pixels()[at]);
+            if a == b { 0.0 } else { angle_deg(a, b) / NORMAL_DEG }
+        };
+        let map = signed(ours.width(), ours.height(), off);
+        let mut shown = scaled("difference", "angle between the normals", NORMAL_DEG, " degrees", map);
+        shown.low = "0".to_owned();
+        let previews = [ours, theirs].map(|p| p.map(|Normal(v)| v.map(|v| byte_from_unit(0.5 * v + 0.5))));
+        self.add("normal", "world space, 0.5 + 0.5 n".to_owned(), previews, vec![shown])
+    }
+
+    fn add_ids(&mut self, name: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Result<(), AuditError> {
+        let inner = away_from_edges(ours);
+        let color = |at: usize| match (ours.pixels()[at] == theirs.pixels()[at], inner[at]) {
+            (true, _) => DIVERGING[1],
+            (false, true) => DIVERGING[2],
+            (false, false) => APART,
+        };
+        let width = ours.width();
+        let picture = Picture::from_fn(width, ours.height(), |x, y| color(y * width + x));
+        let title = "red: ids differ; grey: ids differ at an edge, which does not count".to_owned();
+        let shown = Shown { suffix: "difference", title, low: String::new(), high: String::new(), picture };
+        self.add(name, "one colour per id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])
+    }
+
+    /// Writes the files of a row and adds it.
+    fn add(
+        &mut self,
+        picture: &str,
+        note: String,
+        [ours, theirs]: [Picture<[u8; 3]>; 2],
+        differences: Vec<Shown>,
+    ) -> Result<(), AuditError> {
+        let file = |suffix: &str, shown: &Picture<[u8; 3]>| {
+            let file = format!("{}/{picture}_{suffix}.png", self.folder);
+            write_rgb_bytes(&self.out.join(&file), shown)?;
+            Ok::<_, AuditError>(file)
+        };
+        let (ours, theirs) = (file("ours", &ours)?, file("theirs", &theirs)?);
+        let mut shown = Vec::new();
+        for Shown { suffix, title, low, high, picture } in differences {
+            shown.push(DifferencePreview { file: file(suffix, &picture)?, title, low, high });
+        }
+        self.rows.push(Row { picture: picture.to_owned(), note, ours, theirs, differences: shown });
+        Ok(())
+    }
+}
+
+/// A picture of differences whose scale ends at plus and minus `end`.
+fn scaled(suffix: &'static str, title: &str, end: f64, unit: &str, picture: Picture<[u8; 3]>) -> Shown {
+    let (low, high) = (format!("-{end}{unit}"), format!("+{end}{unit}"));
+    Shown { suffix, title: title.to_owned(), low, high, picture }
+}
+
+fn grey(LinearRgb(rgb): LinearRgb) -> f64 {
+    rgb.into_iter().map(f64::from).sum::<f64>() / 3.0
+}
+
+fn to_bytes(picture: &Picture<LinearRgb>, gain: f64) -> Picture<[u8; 3]> {
+    let brightened = picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * gain) as f32)));
+    brightened.to_srgb().map(|srgb| srgb.0.map(byte_from_unit))
+}
+
+/// The colour of a number from -1 to 1; numbers beyond have the colour of the nearer end.
+fn diverging(value: f64) -> [u8; 3] {
+    let share = value.abs().min(1.0);
+    let end = if value < 0.0 { DIVERGING[0] } else { DIVERGING[2] };
+    std::array::from_fn(|c| {
+        let [from, to] = [DIVERGING[1][c], end[c]].map(f64::from);
+        (from + (to - from) * share).round() as u8
+    })
+}
+
+fn signed(width: usize, height: usize, value: impl Fn(usize) -> f64) -> Picture<[u8; 3]> {
+    Picture::from_fn(width, height, |x, y| diverging(value(y * width + x)))
+}
+
+/// Each tile in one colour. Tiles over the bound have a dark frame, tiles that do not count for the verdict a grey one.
+fn tile_map(
+    (width, height): (usize, usize),
+    [ours, theirs]: [&Halves; 2],
+    kinds: &ShownKinds,
+    bound: f64,
+    scale: [f64; 3],
+) -> Picture<[u8; 3]> {
+    let mut map = Picture::filled(width, height, DIVERGING[1]);
+    for (tile, decides) in kinds.all() {
+        let off = difference(ours, theirs, tile.pixels());
+        let channel = off.worst_channel(bound, scale);
+        let value = match scale[channel] > 0.0 {
+            true => off.mean[channel] / scale[channel] / (LIGHT_TILE * bound),
+            false => f64::from(off.mean[channel] != 0.0),
+        };
+        let frame = match (decides, off.is_over(bound, scale)) {
+            (false, _) => Some(APART),
+            (true, true) => Some([20; 3]),
+            (true, false) => None,
+        };
+        for (x, y) in tile.pixels() {
+            let at_rim =
+                x == tile.columns.start || x + 1 == tile.columns.end || y == tile.rows.start || y + 1 == tile.rows.end;
+            map.set(x, y, frame.filter(|_| at_rim).unwrap_or_else(|| diverging(value)));
+        }
+    }
+    map
+}
+
+/// A colour for each id; consecutive ids have very different colours.
+fn id_color(id: u16) -> [u8; 3] {
+    if id == 0 {
+        return [0; 3];
+    }
+    let hash = u32::from(id).wrapping_mul(0x9e37_79b1);
+    [hash >> 24, hash >> 16, hash >> 8].map(|byte| 40 + (byte as u8 % 200))
+}

@@ -1,0 +1,231 @@
+//! Checks what the files of a scene state: JSON files against the schemas generated from the Rust types, whether `scene.json`
+//! is consistent (indices, references, cameras), the meshes against the reference geometry, and baked materials against
+//! their atlases.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use glam::DMat3;
+use mateval_image::Wrap;
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_prep::faults::Faults;
+use mateval_prep::scene_meshes::Meshes;
+use mateval_scene::dataset::{Part, SceneFile, View, WideView};
+use mateval_scene::glb::GlbNode;
+use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::material::{ColorInput, Material, MaterialModel};
+use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_scene::submission::Map;
+use mateval_scene::{Camera, ViewId};
+use schemars::JsonSchema;
+
+/// Checks `folder/file` against the schema of `T`. Every violation is a fault with its JSON pointer.
+pub(super) fn check_schema<T: JsonSchema>(folder: &Path, file: &str, faults: &mut Faults) {
+    let Some(text) = faults.read(file, std::fs::read(folder.join(file))) else { return };
+    let Some(value) = faults.read(file, serde_json::from_slice::<serde_json::Value>(&text)) else { return };
+    let schema = serde_json::to_value(schemars::schema_for!(T)).expect("a schema can be written as JSON");
+    let validator = jsonschema::validator_for(&schema).expect("schemars generates valid schemas");
+    for error in validator.iter_errors(&value) {
+        let message = error.to_string();
+        // The message quotes the value, which may be long.
+        let short: String = message.chars().take(300).collect();
+        faults.add("breaks_schema", file, error.instance_path().to_string(), short);
+    }
+}
+
+const SCENE_FILE: &str = "scene.json";
+/// Largest deviation of a camera's rotation from orthonormality, and of a view's camera from the turned input camera.
+const CAMERA_SLACK: f64 = 1e-9;
+
+/// Checks the views, and the instances with their parts.
+pub(super) fn check_scene_file(scene: &SceneFile, faults: &mut Faults) {
+    check_views(scene, faults);
+    check_numbers(scene, faults);
+}
+
+fn check_views(scene: &SceneFile, faults: &mut Faults) {
+    let Some(input) = scene.views.first().filter(|view| view.id.as_str() == INPUT) else {
+        faults.add("bad_view", SCENE_FILE, "/views/0", "the first view must be 'input'");
+        return;
+    };
+    let mut ids = BTreeSet::new();
+    for (at, view) in scene.views.iter().enumerate() {
+        let place = format!("/views/{at}/camera");
+        if !ids.insert(&view.id) {
+            faults.add("bad_view", SCENE_FILE, format!("/views/{at}/id"), format!("'{}' is listed twice", view.id));
+        }
+        let rotation = view.camera.rotation();
+        let turned_back = rotation.transpose() * rotation;
+        let is_rotation = turned_back.abs_diff_eq(DMat3::IDENTITY, CAMERA_SLACK) && rotation.determinant() > 0.0;
+        if !is_rotation || view.camera.world_from_camera[3] != [0.0, 0.0, 0.0, 1.0] {
+            faults.add("bad_camera", SCENE_FILE, &place, "world_from_camera is not a rotation and a translation");
+        }
+        let k = view.camera.intrinsics;
+        let is_valid = k.fx > 0.0 && k.fy > 0.0 && k.cx.is_finite() && k.cy.is_finite() && k.width > 0 && k.height > 0;
+        if !is_valid {
+            faults.add(
+                "bad_camera",
+                SCENE_FILE,
+                format!("{place}/intrinsics"),
+                "expected focal lengths and a size above 0, and a finite principal point",
+            );
+        }
+        check_place(view, &input.camera, at, faults);
+    }
+}
+
+/// Checks that a turned view is the input camera turned, and that a wide view is as far from it as it states.
+fn check_place(view: &View, input: &Camera, at: usize, faults: &mut Faults) {
+    let place = format!("/views/{at}/camera");
+    if view.camera.intrinsics != input.intrinsics {
+        faults.add("bad_camera", SCENE_FILE, format!("{place}/intrinsics"), "differ from those of the input camera");
+    }
+    match &view.wide {
+        _ if view.wide.is_some() != view.id.is_wide() => {
+            let message = format!("a view has this key if and only if its id begins with '{}'", ViewId::WIDE);
+            faults.add("bad_view", SCENE_FILE, format!("/views/{at}/wide"), message);
+        }
+        None => {
+            let expected = input.turned(view.x_deg, view.y_deg);
+            if !view.camera.matrix().abs_diff_eq(expected.matrix(), CAMERA_SLACK) {
+                let (x_deg, y_deg) = (view.x_deg, view.y_deg);
+                let message = format!("differs from the input camera turned by {x_deg} and {y_deg} degrees");
+                faults.add("bad_camera", SCENE_FILE, &place, message);
+            }
+        }
+        Some(WideView { distance_m, unseen_share }) => {
+            let found = view.camera.position().distance(input.position());
+            // Also refuses numbers that are not finite.
+            let is_stated = (found - distance_m).abs() <= CAMERA_SLACK;
+            if !is_stated {
+                let message = format!("is {found} m from the input camera, and the view states {distance_m} m");
+                faults.add("bad_camera", SCENE_FILE, &place, message);
+            }
+            if !(0.0..=1.0).contains(unseen_share) {
+                let message = format!("found {unseen_share}, expected 0 to 1");
+                faults.add("bad_view", SCENE_FILE, format!("/views/{at}/wide/unseen_share"), message);
+            }
+        }
+    }
+}
+
+fn check_numbers(scene: &SceneFile, faults: &mut Faults) {
+    let mut ids = BTreeSet::new();
+    for (at, instance) in scene.instances.iter().enumerate() {
+        if usize::from(instance.index.0.get()) != at + 1 {
+            faults.add("bad_index", SCENE_FILE, format!("/instances/{at}/index"), format!("expected {}", at + 1));
+        }
+        if !ids.insert(&instance.id) {
+            faults.add(
+                "duplicate_id",
+                SCENE_FILE,
+                format!("/instances/{at}/id"),
+                format!("'{}' is listed twice", instance.id),
+            );
+        }
+    }
+    check_parts(scene, &scene.parts, "/parts", faults);
+    let mut sets = BTreeSet::new();
+    for (at, set) in scene.part_sets.iter().enumerate() {
+        if !sets.insert(&set.id) {
+            faults.add(
+                "duplicate_id",
+                SCENE_FILE,
+                format!("/part_sets/{at}/id"),
+                format!("'{}' is listed twice", set.id),
+            );
+        }
+        check_parts(scene, &set.parts, &format!("/part_sets/{at}/parts"), faults);
+    }
+}
+
+/// Checks one set of parts, whose JSON pointer is `pointer`.
+fn check_parts(scene: &SceneFile, parts: &[Part], pointer: &str, faults: &mut Faults) {
+    let instances: BTreeSet<_> = scene.instances.iter().map(|instance| &instance.id).collect();
+    let mut ids = BTreeSet::new();
+    for (at, part) in parts.iter().enumerate() {
+        if usize::from(part.index.0.get()) != at + 1 {
+            faults.add("bad_index", SCENE_FILE, format!("{pointer}/{at}/index"), format!("expected {}", at + 1));
+        }
+        if !ids.insert(&part.id) {
+            faults.add(
+                "duplicate_id",
+                SCENE_FILE,
+                format!("{pointer}/{at}/id"),
+                format!("'{}' is listed twice", part.id),
+            );
+        }
+        if !instances.contains(&part.instance) {
+            let message = format!("the scene has no instance '{}'", part.instance);
+            faults.add("dangling_reference", SCENE_FILE, format!("{pointer}/{at}/instance"), message);
+        }
+    }
+    for (at, instance) in scene.instances.iter().enumerate() {
+        let of_parts: usize = parts.iter().filter(|part| part.instance == instance.id).map(|part| part.triangles).sum();
+        if of_parts != instance.triangles {
+            let message = format!("{} triangles, but its parts in {pointer} have {of_parts}", instance.triangles);
+            faults.add("bad_parts", SCENE_FILE, format!("/instances/{at}"), message);
+        }
+    }
+}
+
+/// Whether the reference has exactly the triangles of `instances.glb`. Every difference is reported as a fault.
+pub(super) fn matches_reference(reference: &ReferenceScene, meshes: &Meshes, faults: &mut Faults) -> bool {
+    let before = faults.all.len();
+    const FILE: &str = "ground_truth/reference/geometry.glb";
+    if reference.surfaces.len() != meshes.instances.len() {
+        let message = format!(
+            "{} surfaces, expected one for each of {} instances",
+            reference.surfaces.len(),
+            meshes.instances.len()
+        );
+        faults.add("wrong_nodes", FILE, "", message);
+        return false;
+    }
+    for (surface, node) in reference.surfaces.iter().zip(&meshes.instances) {
+        let (a, b) = (&surface.mesh, &node.mesh);
+        let same = a.triangles.len() == b.triangles.len()
+            && (0..a.triangles.len()).all(|triangle| a.corners(triangle) == b.corners(triangle));
+        if !same {
+            let message = "its triangles differ from those of instances.glb";
+            faults.add("wrong_geometry", FILE, format!("node '{}'", node.name), message);
+        }
+    }
+    faults.all.len() == before
+}
+
+/// Checks that every atlas has its three baked maps, at the size of the atlas.
+pub(super) fn check_materials(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
+    for instance in &scene.instances {
+        let Some(atlas) = &instance.atlas else { continue };
+        for map in Map::ALL {
+            let file = format!("ground_truth/materials/{}/{}.png", instance.id, map.stem());
+            let path = folder.truth_material(&instance.id).join(map.stem()).with_extension("png");
+            let read = read_texture(&path, Encoding::Linear, Wrap::Clamp);
+            let Some(picture) = faults.read(&file, read) else { continue };
+            let size = atlas.size as usize;
+            if (picture.width(), picture.height()) != (size, size) {
+                let message = format!("{}x{} texels, expected {size}x{size}", picture.width(), picture.height());
+                faults.add("wrong_size", &file, "", message);
+            }
+        }
+    }
+}
+
+/// The instances as opaque surfaces, against which pictures are checked where the ground truth is withheld.
+pub(super) fn opaque(meshes: &Meshes) -> ReferenceScene {
+    let material = Material {
+        name: String::new(),
+        model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
+        two_sided: true,
+        opacity: None,
+        bump: None,
+    };
+    let surface =
+        |node: &GlbNode| Surface { name: node.name.clone(), mesh: node.mesh.clone(), material: MaterialIndex(0) };
+    ReferenceScene {
+        surfaces: meshes.instances.iter().map(surface).collect(),
+        materials: vec![material],
+        ..ReferenceScene::default()
+    }
+}

@@ -1,0 +1,328 @@
+//! The commands that show results: `mateval eval tables`, `explain`, `pictures` and `leaderboard`.
+
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+use clap::builder::PossibleValue;
+use mateval_eval::light::rules::Track;
+use mateval_eval::result::ResultFile;
+use mateval_eval::result_key::PictureKind;
+use mateval_report::explain::{self, ExplainPlan};
+use mateval_report::leaderboard::results_folder::ResultsFolder;
+use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, verified, write};
+use mateval_report::strips::{self, Shown, StripPlan};
+use mateval_report::tables::{Grouping, TableFormat, tables};
+use mateval_scene::open::Dataset;
+use mateval_scene::{SceneId, json};
+
+use crate::TOOL;
+use crate::arguments::Format;
+use crate::terminal::{Outcome, print, say, with_progress};
+
+#[derive(clap::Args)]
+pub struct TablesArgs {
+    /// RESULT.json files.
+    #[arg(required = true, value_name = "RESULT.json")]
+    results: Vec<PathBuf>,
+    /// RESULT.json of the truth itself (`mateval baseline gt`), shown in the last row as the ceiling of each column.
+    #[arg(long, value_name = "RESULT.json")]
+    ceiling: Option<PathBuf>,
+    /// Protocol whose scores are shown.
+    #[arg(long, default_value = "mateval-3")]
+    protocol: String,
+    /// Format of the tables.
+    #[arg(long, value_enum, default_value = "markdown")]
+    format: FormatName,
+    /// One row per scene, or per category of instances, whose errors are pooled over all their pixels [default: one row
+    /// per result, over the whole dataset].
+    #[arg(long, value_enum)]
+    by: Option<GroupName>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum GroupName {
+    Scene,
+    Category,
+    SuperCategory,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum FormatName {
+    Markdown,
+    Latex,
+    Csv,
+    Text,
+}
+
+impl TablesArgs {
+    /// Prints the tables, and a warning for each metric that a result lacks.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let results = self.results.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+        let format = match self.format {
+            FormatName::Markdown => TableFormat::Markdown,
+            FormatName::Latex => TableFormat::Latex,
+            FormatName::Csv => TableFormat::Csv,
+            FormatName::Text => TableFormat::Text { bold: std::io::stdout().is_terminal() },
+        };
+        let grouping = match self.by {
+            None => Grouping::Dataset,
+            Some(GroupName::Scene) => Grouping::Scene,
+            Some(GroupName::Category) => Grouping::Category,
+            Some(GroupName::SuperCategory) => Grouping::SuperCategory,
+        };
+        let ceiling = self.ceiling.as_deref().map(ResultFile::read).transpose()?;
+        print(&tables(&results, ceiling.as_ref(), &self.protocol, grouping, format)?)?;
+        for result in results.iter().chain(&ceiling) {
+            for missing in &result.missing {
+                say(&format!(
+                    "warning: '{}': {} is missing: {}; run: {}",
+                    result.method, missing.metric, missing.reason, missing.fix
+                ));
+            }
+        }
+        Ok(Outcome::Good)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct ExplainArgs {
+    /// The RESULT.json file.
+    #[arg(value_name = "RESULT.json")]
+    result: PathBuf,
+    /// The scene to explain.
+    #[arg(long)]
+    scene: SceneId,
+    /// Folder of the dataset that the result was scored on.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// Folder of the submission that was scored.
+    #[arg(long)]
+    submission: PathBuf,
+    /// Protocol whose scores are explained.
+    #[arg(long, default_value = "mateval-3")]
+    protocol: String,
+    /// Folder for explain.md and pictures of the ten worst instances.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// How to print the explanation.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// Replace files that already exist.
+    #[arg(long)]
+    force: bool,
+}
+
+impl ExplainArgs {
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        self.out.iter().try_for_each(|out| explain::check_out(out, self.force))?;
+        let result = ResultFile::read(&self.result)?;
+        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let plan = ExplainPlan {
+            result: &result,
+            protocol: &self.protocol,
+            dataset: &dataset,
+            submission: &self.submission,
+            scene: &self.scene,
+            tool: TOOL.to_owned(),
+        };
+        let found = with_progress(|progress| explain::explain(&plan, progress)).context("cannot explain")?;
+        if let Some(out) = &self.out {
+            for path in found.write(out, self.force)? {
+                say(&format!("wrote '{}'", path.display()));
+            }
+        }
+        print(&match self.format {
+            Format::Json => json::to_text(&found.file),
+            Format::Text => explain::text::plain(&found.file),
+        })?;
+        Ok(Outcome::Good)
+    }
+}
+
+/// Pictures to draw, and how exactly.
+#[derive(clap::Args)]
+pub struct StripArgs {
+    /// What the pictures show; may be given several times [default: albedo; in a leaderboard also rgb_true, if the
+    /// dataset has renders].
+    #[arg(long = "picture", value_name = "PICTURE", value_enum)]
+    shown: Vec<StripPicture>,
+    /// Samples per pixel of lit pictures; each of the two halves of a picture has half of them.
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=65536))]
+    samples: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum StripPicture {
+    Albedo,
+    RgbTrue,
+    RgbFitted,
+}
+
+impl clap::ValueEnum for StripPicture {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Albedo, Self::RgbTrue, Self::RgbFitted]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (kind, help) = match self {
+            Self::Albedo => (PictureKind::Albedo, "base_color"),
+            Self::RgbTrue => (PictureKind::RgbTrue, "RGB under the scene's own lights"),
+            Self::RgbFitted => (PictureKind::RgbFitted, "RGB under lights fitted to the input view"),
+        };
+        Some(PossibleValue::new(kind.word()).help(help))
+    }
+}
+
+impl StripArgs {
+    /// The pictures as the library draws them; albedo by default.
+    pub fn shown(&self) -> Vec<Shown> {
+        self.shown_or(&[StripPicture::Albedo])
+    }
+
+    /// As [`Self::shown`], but by default also of the light of a dataset that has renders to compare with.
+    pub fn shown_in_leaderboard(&self, dataset: &Dataset) -> Vec<Shown> {
+        match dataset.file.photo_renderer {
+            Some(_) => self.shown_or(&[StripPicture::Albedo, StripPicture::RgbTrue]),
+            None => self.shown(),
+        }
+    }
+
+    fn shown_or(&self, default: &[StripPicture]) -> Vec<Shown> {
+        let light = |track| Shown::Light { track, samples: self.samples / 2 };
+        let shown = |picture: &StripPicture| match picture {
+            StripPicture::Albedo => Shown::Albedo,
+            StripPicture::RgbTrue => light(Track::True),
+            StripPicture::RgbFitted => light(Track::Fitted),
+        };
+        let chosen = if self.shown.is_empty() { default } else { &self.shown };
+        chosen.iter().map(shown).collect()
+    }
+}
+
+#[derive(clap::Args)]
+pub struct PicturesArgs {
+    /// Folders of submissions; each has a column after the truth's.
+    #[arg(required = true, value_name = "SUBMISSION")]
+    submissions: Vec<PathBuf>,
+    /// Folder of the dataset.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// Folder for the pictures.
+    #[arg(long)]
+    out: PathBuf,
+    /// Draw this scene only; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
+    scenes: Vec<SceneId>,
+    #[command(flatten)]
+    strips: StripArgs,
+    /// Replace pictures that already exist.
+    #[arg(long)]
+    force: bool,
+}
+
+impl PicturesArgs {
+    /// Writes the pictures and prints their paths.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let submissions: Vec<&Path> = self.submissions.iter().map(PathBuf::as_path).collect();
+        let plan = StripPlan {
+            dataset: &dataset,
+            submissions: &submissions,
+            scenes: &self.scenes,
+            shown: &self.strips.shown(),
+            out: &self.out,
+            force: self.force,
+        };
+        let written = with_progress(|progress| strips::write(&plan, progress))?;
+        written.iter().try_for_each(|path| print(&format!("{}\n", path.display())))?;
+        Ok(Outcome::Good)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct LeaderboardArgs {
+    /// RESULT.json files. One is marked as verified if RESULT.verified.json, written by `eval verify`, lies beside it.
+    #[arg(required_unless_present = "from", value_name = "RESULT.json")]
+    results: Vec<PathBuf>,
+    /// Folder of results, as collected by pull requests: every .json file in it and in the folders below it. In the
+    /// folder itself, ceiling.json is taken for `--ceiling` and errata.json for `--errata`.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["results", "ceiling", "errata"])]
+    from: Option<PathBuf>,
+    /// RESULT.json of the truth itself (`mateval baseline gt`), shown below the methods as the ceiling of each column.
+    #[arg(long, value_name = "RESULT.json")]
+    ceiling: Option<PathBuf>,
+    /// Folder of the site; its index.html opens from the disk.
+    #[arg(long)]
+    out: PathBuf,
+    /// Protocol whose scores are ranked.
+    #[arg(long, default_value = "mateval-3")]
+    protocol: String,
+    /// Accept results that lack scenes, and rank each on the scenes that it covers; they are marked.
+    #[arg(long)]
+    partial: bool,
+    /// Folder of the dataset, to draw pictures of each `--submission`.
+    #[arg(long, requires = "submissions")]
+    dataset: Option<PathBuf>,
+    /// Folder of a submission to show beside the truth; may be given several times.
+    #[arg(long = "submission", value_name = "SUBMISSION", requires = "dataset")]
+    submissions: Vec<PathBuf>,
+    #[command(flatten)]
+    strips: StripArgs,
+    /// Folder of further pictures to show: `<method>/<scene>/<view>/<kind>.png`, with `_truth` as the method of the
+    /// truth's pictures.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
+    /// JSON file of errors that were found after publication.
+    #[arg(long)]
+    errata: Option<PathBuf>,
+    /// Replace a leaderboard that already exists.
+    #[arg(long)]
+    force: bool,
+}
+
+impl LeaderboardArgs {
+    /// Writes the site and prints the path of its first page.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let files = match &self.from {
+            Some(folder) => ResultsFolder::list(folder)?,
+            None => ResultsFolder {
+                results: self.results.clone(),
+                ceiling: self.ceiling.clone(),
+                errata: self.errata.clone(),
+            },
+        };
+        let entries = entries::read(&files)?;
+        let marked = files.results.iter().zip(&entries.verified);
+        for (path, _) in marked.filter(|(_, mark)| **mark == verified::Verified::Stale) {
+            let sidecar = verified::sidecar(path);
+            say(&format!(
+                "warning: '{}' verifies an earlier version of the result; run `eval verify` again",
+                sidecar.display()
+            ));
+        }
+        let dataset = self.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
+        if let Some(pictures) = self.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
+            bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
+        }
+        let plan = LeaderboardPlan {
+            results: &entries.results,
+            ceiling: entries.ceiling.as_ref(),
+            verified: entries.verified.clone(),
+            protocol: &self.protocol,
+            partial: self.partial,
+            errata: entries.errata.as_ref(),
+            pictures: self.pictures.as_deref(),
+            submissions: dataset.as_ref().map(|dataset| Submissions {
+                dataset,
+                folders: self.submissions.clone(),
+                shown: self.strips.shown_in_leaderboard(dataset),
+            }),
+            tool: TOOL.to_owned(),
+        };
+        with_progress(|progress| write(&plan, &self.out, self.force, progress))
+            .context("cannot write the leaderboard")?;
+        print(&format!("{}\n", self.out.join("index.html").display()))?;
+        Ok(Outcome::Good)
+    }
+}

@@ -1,0 +1,280 @@
+//! The baselines `nn` and `procedural` on arrays, as `mateval.lift` and `mateval.procedural`, and `delight` on a scene's photo,
+//! as `mateval.delight`.
+
+use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use mateval_baselines::delight::{CandidateLights, DelightOptions, DelitPhoto};
+use mateval_baselines::estimate::Estimate;
+use mateval_baselines::geometry::SceneGeometry;
+use mateval_baselines::nn::{NnOptions, lift_scene, seen_pixels};
+use mateval_baselines::procedural::{ProceduralOptions, scene_maps};
+use mateval_baselines::seen_cloud::FillRule;
+use mateval_baselines::{BaselineError, delight as baseline, maps};
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_scene::submission::MAP_SIZES;
+use mateval_scene::{PartSetId, Progress};
+use mateval_submission::bad_texels::BASE_COLOR_RANGE;
+use numpy::{PyArray2, PyArray3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{MapInput, plane, triples};
+use crate::dataset::Scene;
+use crate::instance::SceneSource;
+use crate::long_work::{failed, run_long};
+
+/// The maps of an instance, encoded as a submission stores them.
+#[pyclass(frozen, get_all, module = "mateval")]
+pub struct Maps {
+    /// sRGB: (side, side, 3), uint8; None where the estimate has none.
+    base_color: Option<Py<PyArray3<u8>>>,
+    /// Perceptual roughness times 255: (side, side), uint8; None where the estimate has none.
+    roughness: Option<Py<PyArray2<u8>>>,
+    /// Metallic times 255: (side, side), uint8; None where the estimate has none.
+    metallic: Option<Py<PyArray2<u8>>>,
+    /// Whether the input view shows each texel: (side, side), bool; None from procedural without keep_seen.
+    seen: Option<Py<PyArray2<bool>>>,
+}
+
+/// The maps of an instance before Python gets them.
+pub(crate) struct MadeMaps {
+    pub(crate) maps: maps::Maps,
+    pub(crate) seen: Option<Mask>,
+}
+
+/// Lifts an estimate of the input view to the atlases of all instances that have one: seen texels get the estimate, the
+/// others that of the seen points nearest to them. The maps are those of `mateval baseline nn`.
+///
+/// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
+/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. At least one of them must be given.
+///
+/// neighbours is the number of seen points that an unseen texel is computed from, normal_weight the distance in metres
+/// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side of
+/// all maps in texels; None is the dataset's own size of each.
+///
+/// Returns the maps by the id of the instance, in the scene's order.
+#[pyfunction]
+#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, neighbours=1, normal_weight=0.0, any_instance=false, atlas_size=None))]
+#[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+pub fn lift<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    base_color: Option<Bound<'py, PyAny>>,
+    roughness: Option<Bound<'py, PyAny>>,
+    metallic: Option<Bound<'py, PyAny>>,
+    neighbours: u8,
+    normal_weight: f64,
+    any_instance: bool,
+    atlas_size: Option<u32>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let estimate = estimate([("base_color", base_color), ("roughness", roughness), ("metallic", metallic)])?;
+    let options = options(neighbours, normal_weight, any_instance, atlas_size)?;
+    let source = Arc::clone(&scene.source);
+    let all = run_long(py, move |progress| lifted(&source, &estimate, &options, progress))?.map_err(failed)?;
+    by_id(py, scene, all)
+}
+
+/// The maps by the id of the instance.
+pub(crate) fn by_id<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    all: BTreeMap<usize, MadeMaps>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let by_id = PyDict::new(py);
+    for (instance, made) in all {
+        by_id.set_item(scene.source.file().instances[instance].id.as_str(), made.into_python(py)?)?;
+    }
+    Ok(by_id)
+}
+
+/// An estimate of pictures of one size.
+pub(crate) fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Estimate> {
+    let read = |(name, array): &(&'static str, Option<Bound<'_, PyAny>>)| {
+        array.as_ref().map(|array| MapInput::new(name, array)).transpose()
+    };
+    let inputs = [read(&given[0])?, read(&given[1])?, read(&given[2])?];
+    inputs.iter().flatten().try_for_each(|input| input.check_range(&BASE_COLOR_RANGE))?;
+    let mut present = inputs.iter().flatten();
+    let Some(first) = present.next() else {
+        return Err(PyValueError::new_err("expected base_color, roughness or metallic, found none of them"));
+    };
+    present.try_for_each(|other| other.check_same_size(first))?;
+    let [base_color, roughness, metallic] = &inputs;
+    Ok(Estimate {
+        base_color: base_color.as_ref().map(MapInput::linear).transpose()?,
+        roughness: roughness.as_ref().map(MapInput::plane).transpose()?,
+        metallic: metallic.as_ref().map(MapInput::plane).transpose()?,
+        ..Estimate::default()
+    })
+}
+
+fn options(neighbours: u8, normal_weight_m: f64, any_instance: bool, atlas_size: Option<u32>) -> PyResult<NnOptions> {
+    let Some(neighbours) = NonZero::new(usize::from(neighbours)) else {
+        return Err(PyValueError::new_err("neighbours: expected 1 to 255, found 0"));
+    };
+    if !(0.0..=100.0).contains(&normal_weight_m) {
+        return Err(PyValueError::new_err(format!("normal_weight: expected 0 to 100 m, found {normal_weight_m}")));
+    }
+    if let Some(size) = atlas_size.filter(|size| !MAP_SIZES.contains(&(*size as usize))) {
+        let (least, most) = (MAP_SIZES.start(), MAP_SIZES.end());
+        return Err(PyValueError::new_err(format!("atlas_size: expected {least} to {most} texels, found {size}")));
+    }
+    Ok(NnOptions { rule: FillRule { neighbours, normal_weight_m }, any_instance, atlas_size })
+}
+
+/// The maps by the instance's place in the scene.
+fn lifted(
+    source: &SceneSource,
+    estimate: &Estimate,
+    options: &NnOptions,
+    progress: Progress<'_>,
+) -> Result<BTreeMap<usize, MadeMaps>, BaselineError> {
+    let geometry = SceneGeometry::read(source.folder(), source.file())?;
+    let seen = seen_pixels(&geometry, estimate)?;
+    let all = Mutex::new(BTreeMap::new());
+    lift_scene(&geometry, estimate, &seen, options, progress, |instance, lifted, medians| {
+        let given = estimate.given_maps();
+        let made = match lifted {
+            Some(lifted) => {
+                let side = lifted.whole.texels.width();
+                let seen = Some(Picture::new(side, side, lifted.seen)?);
+                MadeMaps { maps: maps::Maps::of_atlas(&lifted.whole, given), seen }
+            }
+            None => {
+                let side = *MAP_SIZES.start();
+                let maps = maps::Maps::constant(medians.of(&geometry, instance), given);
+                MadeMaps { maps, seen: Some(Picture::filled(side, side, false)) }
+            }
+        };
+        all.lock().unwrap_or_else(PoisonError::into_inner).insert(instance, made);
+        Ok(())
+    })?;
+    Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+impl MadeMaps {
+    fn into_python(self, py: Python<'_>) -> PyResult<Maps> {
+        let colours = |picture: &Picture<[u8; 3]>| PyResult::Ok(triples(py, picture, |rgb| rgb)?.unbind());
+        let numbers = |picture: &Picture<u8>| PyResult::Ok(plane(py, picture)?.unbind());
+        Ok(Maps {
+            base_color: self.maps.base_color.as_ref().map(colours).transpose()?,
+            roughness: self.maps.roughness.as_ref().map(numbers).transpose()?,
+            metallic: self.maps.metallic.as_ref().map(numbers).transpose()?,
+            seen: self.seen.as_ref().map(|seen| PyResult::Ok(plane(py, seen)?.unbind())).transpose()?,
+        })
+    }
+}
+
+/// Gives each part a procedural graph that is fitted to an estimate of the input view, so that patterns continue where
+/// the view shows nothing; parts without a pattern have their median. The maps are those of
+/// `mateval baseline procedural`.
+///
+/// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
+/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. base_color must be given.
+/// `mateval.delight` makes all of them from the photo.
+///
+/// part_set names the parts; None stands for those of the source. keep_seen keeps the estimate in texels that the input
+/// view shows. detail, 0 to 1, is how much of a pattern's randomness is kept.
+///
+/// Returns the maps by the id of the instance, in the scene's order.
+#[pyfunction]
+#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, part_set=None, keep_seen=false, detail=1.0))]
+#[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+pub fn procedural<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    base_color: Option<Bound<'py, PyAny>>,
+    roughness: Option<Bound<'py, PyAny>>,
+    metallic: Option<Bound<'py, PyAny>>,
+    part_set: Option<&str>,
+    keep_seen: bool,
+    detail: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let estimate = estimate([("base_color", base_color), ("roughness", roughness), ("metallic", metallic)])?;
+    let part_set = part_set.map(|name| name.parse::<PartSetId>()).transpose();
+    let part_set = part_set.map_err(|fault| PyValueError::new_err(format!("part_set: {fault}")))?;
+    let options = ProceduralOptions { part_set, keep_seen, detail, ..ProceduralOptions::default() };
+    options.check().map_err(|fault| PyValueError::new_err(fault.to_string()))?;
+    let source = Arc::clone(&scene.source);
+    let all = run_long(py, move |progress| procedural_maps(&source, &estimate, &options, progress))?.map_err(failed)?;
+    by_id(py, scene, all)
+}
+
+/// The maps by the instance's place in the scene.
+fn procedural_maps(
+    source: &SceneSource,
+    estimate: &Estimate,
+    options: &ProceduralOptions,
+    progress: Progress<'_>,
+) -> Result<BTreeMap<usize, MadeMaps>, BaselineError> {
+    let geometry = SceneGeometry::read(source.folder(), source.file())?;
+    let mut all = BTreeMap::new();
+    for (instance, baked) in scene_maps(&geometry, estimate, options, progress)? {
+        all.insert(instance, MadeMaps { maps: baked.maps, seen: baked.seen });
+    }
+    Ok(all)
+}
+
+/// A photo without its light. Its pictures are those of the input view.
+#[pyclass(frozen, get_all, module = "mateval")]
+pub struct Delit {
+    /// Linear, 0 to 1: (height, width, 3), float32. Black where a pixel is not valid.
+    base_color: Py<PyArray3<f32>>,
+    /// Perceptual roughness: (height, width), float32. 0.5 unless another value explains the photo better.
+    roughness: Py<PyArray2<f32>>,
+    /// 1 for mirrors, else 0: (height, width), float32.
+    metallic: Py<PyArray2<f32>>,
+    /// The radiance that a white surface would show, apart from what it reflects: (height, width, 3), float32, linear,
+    /// before exposure.
+    shading: Py<PyArray3<f32>>,
+    /// The radiance that does not depend on base colour: (height, width, 3), float32, linear, before exposure.
+    gloss: Py<PyArray3<f32>>,
+    /// How well base_color is known: (height, width), float32, 0 to 1; 0.5 where its standard error is 0.05.
+    confidence: Py<PyArray2<f32>>,
+    /// The radiance of each light that may shine, by its name: linear Rec. 709, before exposure.
+    radiances: Py<PyDict>,
+}
+
+/// Takes the light out of a scene's photo, by physics alone: geometry is known, so that the light can be computed. The
+/// result is that of `mateval baseline delight`.
+///
+/// lights chooses which lights may shine: "room" (light fixtures, ceilings, what is seen to glow, the world around, and
+/// the lights of a stage) or "stage" (the latter alone, as in PSDR-Room).
+#[pyfunction]
+#[pyo3(signature = (scene, *, lights="room"))]
+pub fn delight(py: Python<'_>, scene: &Scene, lights: &str) -> PyResult<Delit> {
+    let lights = match lights {
+        "room" => CandidateLights::Room,
+        "stage" => CandidateLights::Stage,
+        other => return Err(PyValueError::new_err(format!("lights: expected 'room' or 'stage', found '{other}'"))),
+    };
+    let options = DelightOptions { lights, ..DelightOptions::default() };
+    let source = Arc::clone(&scene.source);
+    let delit = run_long(py, move |progress| -> Result<DelitPhoto, BaselineError> {
+        let geometry = SceneGeometry::read(source.folder(), source.file())?;
+        baseline::delight(&geometry, &options, progress)
+    })?;
+    delit_into_python(py, &delit.map_err(failed)?)
+}
+
+fn delit_into_python(py: Python<'_>, delit: &DelitPhoto) -> PyResult<Delit> {
+    let colors = |picture: &Picture<LinearRgb>| PyResult::Ok(triples(py, picture, |rgb| rgb.0)?.unbind());
+    let numbers = |picture: &Picture<f32>| PyResult::Ok(plane(py, picture)?.unbind());
+    let radiances = PyDict::new(py);
+    for fitted in &delit.lights {
+        let [r, g, b] = fitted.radiance;
+        radiances.set_item(&fitted.light.name, (r, g, b))?;
+    }
+    Ok(Delit {
+        base_color: colors(&delit.base_color)?,
+        roughness: numbers(&delit.roughness)?,
+        metallic: numbers(&delit.metallic)?,
+        shading: colors(&delit.shading)?,
+        gloss: colors(&delit.gloss)?,
+        confidence: numbers(&delit.confidence)?,
+        radiances: radiances.unbind(),
+    })
+}
