@@ -1,4 +1,4 @@
-//! The faults of a recipe, all of which are reported at once.
+//! The faults of a recipe, all of which are reported at once, and the ranges of its numbers.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,13 @@ use mateval_scene::findings::shortened;
 use mateval_scene::{PartSetId, SceneError, SceneId, ViewId};
 use mateval_sources::below::BelowError;
 
-use super::limits::{ATLAS_SIZES, FARTHEST_M, RESOLUTION};
+/// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers are
+/// centimetres apart.
+pub(super) const FARTHEST_M: f64 = 1e6;
+/// Least and most pixels of a picture's side.
+pub(crate) const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;
+/// Least and most texels of an atlas's side.
+pub const ATLAS_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 
 /// One fault of a recipe.
 #[derive(Debug, thiserror::Error)]
@@ -221,4 +227,20 @@ pub enum RecipeSceneFault {
         /// The SHA-256 in the recipe.
         pinned: String,
     },
+}
+
+/// Adds a [`RecipeFault`] for each size that is out of range. `owner` is the recipe or the scene, as messages name it.
+pub(super) fn check_sizes(
+    owner: &str,
+    resolution: Option<[u32; 2]>,
+    atlas_size: Option<u32>,
+    faults: &mut Vec<RecipeFault>,
+) {
+    let owner = || owner.to_owned();
+    if let Some(found) = resolution.filter(|sides| !sides.iter().all(|side| RESOLUTION.contains(side))) {
+        faults.push(RecipeFault::Resolution { owner: owner(), found });
+    }
+    if let Some(found) = atlas_size.filter(|size| !ATLAS_SIZES.contains(size)) {
+        faults.push(RecipeFault::AtlasSize { owner: owner(), found });
+    }
 }
