@@ -201,7 +201,8 @@ impl Chosen {
 
 #[cfg(test)]
 mod tests {
-    use super::super::survey_file::CandidateCamera;
+    use crate::survey::survey_file::CandidateCamera;
+
     use super::*;
 
     fn room(house: usize, room_type: &str, [objects, super_categories]: [usize; 2], score: f64) -> SurveyedRoom {
