@@ -18,8 +18,8 @@ use crate::build::scene_mark::{SceneMark, settings_sha256};
 use crate::build::start::is_build;
 use crate::error::PrepError;
 use crate::recipe::{self, RECIPE, Recipe};
-use crate::render::kind::RendererKind;
-use crate::render::store::{can_show_input, show_input};
+use crate::render::run::RendererKind;
+use crate::render::run::{can_show_input, show_input};
 
 /// Pictures that a killed render wrote and that no list names yet.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 use mateval_scene::{Finding, Severity, json};
 use serde::{Deserialize, Serialize};
 
-use super::process::{BlenderLimits, BlenderProgram, Ended, run, tail};
-use super::scripts;
+use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
 use crate::build_scene::fault::BakeFault;
 use crate::error::PrepError;
 
@@ -135,7 +134,7 @@ pub fn bake(
     let absolute = |path: &Path| std::path::absolute(path).map_err(PrepError::io("resolve", path));
     let (blend, out) = (absolute(blend)?, absolute(out)?);
     std::fs::create_dir_all(&out).map_err(PrepError::io("make", &out))?;
-    let script = scripts::write(&out)?.with_file_name(scripts::BAKE);
+    let script = write_scripts(&out)?.with_file_name(BAKE_SCRIPT);
     let file = blend.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let job = Job {
         format: JOB_FORMAT,

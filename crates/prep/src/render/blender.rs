@@ -15,9 +15,7 @@ use mateval_scene::render_file::RenderFile;
 use mateval_scene::render_noise::RenderNoise;
 use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference_io};
 
-use super::render_run::{MAX_BOUNCES, RenderRun, seed, seed_texts};
-use super::report::RenderReport;
-use super::store::{self, ViewRender};
+use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
 use crate::blender::{
     BlenderEvent, BlenderLimits, BlenderProgram, BlenderResult, BlenderView, JobFolder, JobPlan, JobView, tail,
 };
@@ -242,7 +240,7 @@ impl BlenderScene<'_> {
             approximations: result.approximations.clone(),
         };
         let render = ViewRender { halves: [a, b], shown: &pictures.denoised, passes: Some(pictures) };
-        store::write(&folder.render(&self.run.renderer, &view.id), &render, scene.exposure, &file)
+        write_view(&folder.render(&self.run.renderer, &view.id), &render, scene.exposure, &file)
     }
 
     fn finding(&self, failure: Failure) -> Finding {
