@@ -6,7 +6,7 @@ use mateval_scene::ids::quoted;
 use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{SceneId, ViewId};
 
-use crate::build_scene::fault::SceneFault;
+use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
 
 /// Why a dataset, its renders or a survey could not be made.

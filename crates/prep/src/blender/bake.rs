@@ -9,7 +9,7 @@ use mateval_scene::{Finding, Severity, json};
 use serde::{Deserialize, Serialize};
 
 use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
-use crate::build_scene::fault::BakeFault;
+use crate::build::fault::BakeFault;
 use crate::error::PrepError;
 
 const JOB_FORMAT: &str = "mateval-bake/1";

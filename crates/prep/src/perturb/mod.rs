@@ -21,11 +21,11 @@ use mateval_scene::work_folder::{WorkFolder, check_holds_none};
 use mateval_scene::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference_io};
 use mateval_tracer::World;
 
-use crate::build_scene::view_pictures::{note_nearest, unseen_share, write_geometry, write_parts};
 use crate::error::PrepError;
-use crate::faults::Faults;
+use crate::scene_meshes::Faults;
 use crate::scene_meshes::{self, Meshes};
 use crate::views::ViewScene;
+use crate::views::{note_nearest, unseen_share, write_geometry, write_parts};
 use motion::amounts;
 pub use motion::most_level;
 use motion::{Amount, Motion, crossing};

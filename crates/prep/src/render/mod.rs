@@ -26,9 +26,9 @@ use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World
 
 use crate::blender::LightPictures;
 pub use crate::blender::{BlenderLimits, BlenderProgram};
+use crate::build::finish::{check_strays, finish_again};
 use crate::build::start::is_build;
 use crate::error::PrepError;
-use crate::finish::{check_strays, finish_again};
 use crate::recipe::{self, RECIPE};
 pub use blender::BlenderOptions;
 pub use run::{MAX_BOUNCES, RenderReport, RendererKind, UnknownRenderer};
@@ -88,7 +88,7 @@ impl Renderer {
 }
 
 /// Renders the dataset in `root`. Where no scenes are chosen, it then names the photo renderer and writes a new manifest;
-/// otherwise [`crate::finish`] does so, and several processes may render different scenes at once.
+/// otherwise [`crate::build::finish`] does so, and several processes may render different scenes at once.
 ///
 /// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
 /// cannot render becomes a failure in the report; the others are still rendered. Scenes with a photo from elsewhere are not

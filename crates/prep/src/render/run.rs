@@ -16,7 +16,7 @@ use mateval_scene::{Finding, RendererId, SceneId, ViewId, json};
 
 use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
-use crate::preview;
+use crate::views::write_preview;
 
 /// A renderer, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -185,7 +185,7 @@ pub(super) fn write_view(
         light(&format!("group_{at:02}_b"), b)?;
         light(&format!("group_{at:02}"), shown)?;
     }
-    preview::write(place, &render.shown.rgb, exposure)?;
+    write_preview(place, &render.shown.rgb, exposure)?;
     if let Some(view) = render.passes {
         write_passes(place, view)?;
     }

@@ -1,11 +1,11 @@
 //! The faults for which a scene of a recipe is refused while it is made.
 
+use mateval_image::ImageError;
+use mateval_scene::source_folder::FileFault;
 use mateval_scene::{Finding, Severity};
 use mateval_sources::front3d::camera_sampler::CameraError;
 
-pub use super::photo::PhotoFault;
-use crate::numbering::TooMany;
-use crate::part_labels::LabelFault;
+use super::parts::{LabelFault, TooMany};
 use crate::recipe::fault::RecipeSceneFault;
 
 /// Why a scene cannot be made.
@@ -150,6 +150,31 @@ pub enum BakeFault {
         what: String,
         /// The end of its log.
         log: String,
+    },
+}
+
+/// Why a photo cannot be the input picture.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotoFault {
+    /// The file lies outside the folder, cannot be read or is too large.
+    #[error(transparent)]
+    File(#[from] FileFault),
+    /// The file is not a valid photo.
+    #[error(transparent)]
+    Picture(#[from] ImageError),
+    /// The photo shows more or less than the camera, or is smaller than its picture.
+    #[error(
+        "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; \
+         crop the photo, or state another `resolution`",
+        found[0], found[1], expected[0], expected[1]
+    )]
+    Size {
+        /// The path in the recipe.
+        file: String,
+        /// Columns and rows of the photo.
+        found: [u32; 2],
+        /// Columns and rows of the camera's picture.
+        expected: [u32; 2],
     },
 }
 
