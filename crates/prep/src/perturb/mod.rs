@@ -22,13 +22,10 @@ use mateval_scene::{InstanceId, Progress, Report, SceneError, SceneId, TriangleM
 use mateval_tracer::World;
 
 use crate::error::PrepError;
-use crate::scene_meshes::Faults;
-use crate::scene_meshes::{self, Meshes};
-use crate::views::ViewScene;
-use crate::views::{note_nearest, unseen_share, write_geometry, write_parts};
-use motion::amounts;
+use crate::scene_meshes::{self, Faults, Meshes};
+use crate::views::{ViewScene, note_nearest, unseen_share, write_geometry, write_parts};
 pub use motion::most_level;
-use motion::{Amount, Motion, crossing};
+use motion::{Amount, Motion, amounts, crossing};
 
 /// What to do with the furniture of a dataset.
 #[derive(Clone, Copy, Debug)]
