@@ -126,7 +126,7 @@ fn render_file(
 }
 
 /// The folder of the pictures in the report's folder.
-pub(crate) const PICTURES: &str = "pictures";
+const PICTURES: &str = "pictures";
 
 /// The most pixels of a row.
 const MOST_WIDTH: usize = 240;

@@ -305,7 +305,7 @@ fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&SceneId]) -> S
 const ACTION: &str = "make it again from this dataset, or leave it out";
 
 /// A finding about the place, a JSON pointer, of a file.
-pub(crate) fn unfit(path: &Path, place: &str, message: String) -> Finding {
+fn unfit(path: &Path, place: &str, message: String) -> Finding {
     Finding {
         severity: Severity::Error,
         code: "unfit_file".to_owned(),
@@ -318,7 +318,7 @@ pub(crate) fn unfit(path: &Path, place: &str, message: String) -> Finding {
 
 /// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends the
 /// reading.
-pub(crate) fn fitting<T>(
+fn fitting<T>(
     read: Result<T, SceneError>,
     expected: &str,
     path: &Path,

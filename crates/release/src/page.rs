@@ -76,7 +76,7 @@ fn csp_hash(text: &str) -> String {
 
 /// A number at a glance.
 #[derive(Serialize)]
-pub(crate) struct Headline {
+struct Headline {
     value: String,
     label: String,
     is_bad: bool,
@@ -84,13 +84,13 @@ pub(crate) struct Headline {
 
 /// A scene that fails, and why.
 #[derive(Serialize)]
-pub(crate) struct Failure {
+struct Failure {
     scene: String,
     reasons: Vec<String>,
 }
 
 /// The numbers at a glance.
-pub(crate) fn headlines(file: &ReleaseFile) -> Vec<Headline> {
+fn headlines(file: &ReleaseFile) -> Vec<Headline> {
     let mut all = vec![scenes(file), verified(file), compared(file), noise(file)];
     all.extend(SHOWN_SCORES.map(|(title, key)| {
         let mean = |scores: &Option<ReferenceScores>| {
@@ -169,7 +169,7 @@ fn cost(file: &ReleaseFile) -> Headline {
 }
 
 /// The scenes that fail, in the dataset's order.
-pub(crate) fn failures(scenes: &[ScenePage<'_>]) -> Vec<Failure> {
+fn failures(scenes: &[ScenePage<'_>]) -> Vec<Failure> {
     let failure = |page: &ScenePage<'_>| {
         let verdicts =
             [("prep verify", &page.verified, &page.verified.text), ("prep compare", &page.compared, &page.checks)];
@@ -183,7 +183,7 @@ pub(crate) fn failures(scenes: &[ScenePage<'_>]) -> Vec<Failure> {
 }
 
 /// The findings of `prep verify` that are about no single scene.
-pub(crate) fn whole_findings(file: &ReleaseFile) -> Vec<String> {
+fn whole_findings(file: &ReleaseFile) -> Vec<String> {
     file.verified_whole().map(Finding::to_string).collect()
 }
 
@@ -195,7 +195,7 @@ pub(crate) struct Missing {
 }
 
 /// Everything that the page does not state because it was not given.
-pub(crate) fn not_given(file: &ReleaseFile) -> Vec<Missing> {
+fn not_given(file: &ReleaseFile) -> Vec<Missing> {
     let all = file.scenes.len();
     let not_compared = comparable(file).saturating_sub(file.comparisons().count());
     let no_cost = file.scenes.iter().filter(|scene| scene.costs.is_empty()).count();

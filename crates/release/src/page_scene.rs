@@ -19,7 +19,7 @@ pub(crate) const SHOWN_SCORES: [(&str, ResultKey); 2] = [
 
 /// A cell: what the column is sorted by, and its text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Cell {
+struct Cell {
     pub(crate) value: Option<f64>,
     pub(crate) text: String,
 }

@@ -24,7 +24,7 @@ const MOST_BYTES: u64 = 4 << 30;
 const HASH_DIGITS: usize = 64;
 
 /// A layout, or why there is none.
-pub(super) type Made = Result<AtlasLayout, AtlasError>;
+type Made = Result<AtlasLayout, AtlasError>;
 
 /// The shape of a mesh as a key: SHA-256, hex, of its vertices and triangles.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -259,7 +259,7 @@ pub(super) struct AtlasLayout {
     /// The same triangles in the same order. Vertices are split at the borders of charts.
     pub(super) triangles: Vec<[u32; 3]>,
     /// The shape's vertex of each vertex.
-    pub(super) source_vertices: Vec<u32>,
+    source_vertices: Vec<u32>,
     /// The place of each vertex, 0 to 1, v upwards.
     pub(super) uvs: Vec<[f32; 2]>,
 }

@@ -29,7 +29,7 @@ pub(super) struct Seen {
     /// The share of the valid pixels of each view that the input view does not show.
     pub(super) unseen_shares: Vec<f64>,
     /// For each instance, how many valid pixels of the input view show it.
-    pub(super) input_pixels: Vec<usize>,
+    input_pixels: Vec<usize>,
     /// Findings about views that are of little use.
     pub(super) findings: Vec<Finding>,
 }

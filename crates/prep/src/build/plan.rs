@@ -197,7 +197,7 @@ const MORE_OUTSIDE: f64 = 0.02;
 
 /// The wide views of a scene with the input camera `input`, and a finding for each that has no free place. `file` is the
 /// one that findings refer to. `scored` states for each surface whether it is scored.
-pub(super) fn wide_views(
+fn wide_views(
     wide: &WideViews,
     world: &World,
     input: &Camera,

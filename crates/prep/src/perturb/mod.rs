@@ -126,7 +126,7 @@ impl PerturbedScene {
 }
 
 /// Whether [`write_scene`] writes this public file of a dataset.
-pub(super) fn is_rewritten(file: &str) -> bool {
+fn is_rewritten(file: &str) -> bool {
     let Some((_, in_scene)) = file.strip_prefix("scenes/").and_then(|rest| rest.split_once('/')) else { return false };
     let is_photo = in_scene.ends_with("/rgb.exr") || in_scene.ends_with("/rgb.png");
     in_scene == "scene.json" || in_scene.starts_with("geometry/") || in_scene.starts_with("views/") && !is_photo

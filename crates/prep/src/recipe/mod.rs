@@ -236,7 +236,7 @@ impl WideViews {
     }
 
     /// The ids of views whose places are given.
-    pub(super) fn given_ids(&self) -> impl Iterator<Item = &ViewId> {
+    fn given_ids(&self) -> impl Iterator<Item = &ViewId> {
         let given = match self {
             Self::Drawn(_) => &[],
             Self::Given(views) => views.as_slice(),

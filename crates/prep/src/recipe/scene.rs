@@ -318,7 +318,7 @@ impl TryFrom<CameraWords> for RecipeCamera {
 
 impl RecipeCamera {
     /// Whether coordinates and field of view are in range.
-    pub(super) fn is_in_range(&self) -> bool {
+    fn is_in_range(&self) -> bool {
         let has_sound_field = |fov_y_deg: f64| fov_y_deg > 0.0 && fov_y_deg < 179.0;
         match self {
             Self::Given(camera) => {

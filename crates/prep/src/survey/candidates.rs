@@ -276,7 +276,7 @@ fn thumbnail_camera(camera: &Camera) -> Camera {
 }
 
 /// A camera and where it comes from.
-pub(super) struct Posed {
+struct Posed {
     /// As in `seed 3` or `designer 5`.
     pub(super) origin: String,
     pub(super) camera: Camera,
@@ -284,7 +284,7 @@ pub(super) struct Posed {
 }
 
 /// Draws the cameras of one house.
-pub(super) struct CameraDraws<'a> {
+struct CameraDraws<'a> {
     options: &'a SurveyOptions,
     house: &'a FurnishedHouse,
     world: &'a World,
@@ -308,7 +308,7 @@ impl<'a> CameraDraws<'a> {
     }
 
     /// Every camera of a room that may be tried; and why no more could be drawn.
-    pub(super) fn posed(&self, room: usize) -> (Vec<Posed>, Vec<RefusedCamera>) {
+    fn posed(&self, room: usize) -> (Vec<Posed>, Vec<RefusedCamera>) {
         let sampler = match RoomSampler::new(self.house, self.world, room) {
             Ok(sampler) => sampler,
             Err(why) => return (Vec::new(), vec![RefusedCamera { origin: None, why: why.into() }]),
@@ -365,7 +365,7 @@ impl<'a> CameraDraws<'a> {
 
 /// A camera that is not offered, and why.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct RefusedCamera {
+struct RefusedCamera {
     /// Where the camera comes from, as in `seed 3`; none where no camera can be drawn in the room at all.
     pub(super) origin: Option<String>,
     pub(super) why: CameraRefusal,
@@ -373,7 +373,7 @@ pub(super) struct RefusedCamera {
 
 /// The rule that a camera breaks.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub(super) enum CameraRefusal {
+enum CameraRefusal {
     /// No camera could be drawn.
     #[error(transparent)]
     Sampler(#[from] CameraError),

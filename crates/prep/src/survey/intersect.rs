@@ -150,7 +150,7 @@ const GRID: usize = 16;
 const THINNEST_M: f32 = 1e-4;
 
 /// A piece with its acceleration structure.
-pub(super) struct Solid<'a> {
+struct Solid<'a> {
     mesh: &'a TriangleMesh,
     accel: Accel,
     on_surface: OnceLock<Vec<Vec3>>,
@@ -164,12 +164,12 @@ impl<'a> Solid<'a> {
     }
 
     /// The lower and upper corner of its box.
-    pub(super) fn bounds(&self) -> [Vec3; 2] {
+    fn bounds(&self) -> [Vec3; 2] {
         self.accel.bounds()
     }
 
     /// Whether the piece encloses the place.
-    pub(super) fn encloses(&self, place: Vec3) -> bool {
+    fn encloses(&self, place: Vec3) -> bool {
         let [low, high] = self.bounds();
         if !(place.cmpge(low).all() && place.cmple(high).all()) {
             return false;
@@ -183,7 +183,7 @@ impl<'a> Solid<'a> {
     }
 
     /// The parts of a ray's first `reach` metres that the piece encloses: where each begins and ends, sorted.
-    pub(super) fn enclosed_along(&self, from: Vec3, direction: Vec3, reach: f32) -> Vec<[f32; 2]> {
+    fn enclosed_along(&self, from: Vec3, direction: Vec3, reach: f32) -> Vec<[f32; 2]> {
         let Some([enter, leave]) = self.within_box(from, direction, reach) else { return Vec::new() };
         let mut places = vec![enter];
         places.extend(self.crossings(&Ray::new(from, direction, leave)));
@@ -227,12 +227,12 @@ impl<'a> Solid<'a> {
     }
 
     /// Points on the surface, evenly over its area.
-    pub(super) fn on_surface(&self) -> &[Vec3] {
+    fn on_surface(&self) -> &[Vec3] {
         self.on_surface.get_or_init(|| points_on(self.mesh))
     }
 
     /// The points of a grid over its box that it encloses.
-    pub(super) fn enclosed_points(&self) -> &[Vec3] {
+    fn enclosed_points(&self) -> &[Vec3] {
         self.enclosed.get_or_init(|| {
             let [low, high] = self.bounds();
             let at = |k: usize| (k as f32 + 0.5) / GRID as f32;
@@ -243,7 +243,7 @@ impl<'a> Solid<'a> {
     }
 
     /// The volume that it encloses, in cubic metres.
-    pub(super) fn volume_m3(&self) -> f64 {
+    fn volume_m3(&self) -> f64 {
         let [low, high] = self.bounds().map(Vec3::as_dvec3);
         let share = self.enclosed_points().len() as f64 / (GRID * GRID * GRID) as f64;
         (high - low).element_product() * share

@@ -81,7 +81,7 @@ fn search_apart(search: &mut HouseSearch<'_>, house: &Path) -> Result<bool, Prep
 const HERE: &str = ".";
 
 /// Checks that everything that all houses need exists; otherwise each of them would report the same fault.
-pub(super) fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
+fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
     let source = options.source.as_deref().unwrap_or(Path::new(HERE));
     let folders = [Some(&options.models), options.textures.as_ref()].into_iter().flatten();
     let missing_folder = folders.map(|path| source.join(path)).find(|path| !path.is_dir());
@@ -109,7 +109,7 @@ fn given_paths(options: &SurveyOptions) -> impl Iterator<Item = &PathBuf> {
 
 /// The options with all paths relative to `source`. These paths are written to the survey and its recipe, and end up in
 /// what is built from that.
-pub(super) fn relative_to(source: &Path, options: &SurveyOptions) -> Result<SurveyOptions, PrepError> {
+fn relative_to(source: &Path, options: &SurveyOptions) -> Result<SurveyOptions, PrepError> {
     let relative = |path: &PathBuf| {
         let chosen = options.source.is_none() && source != Path::new(HERE);
         let path = if chosen { std::path::absolute(path).map_err(PrepError::io("find", path))? } else { path.clone() };

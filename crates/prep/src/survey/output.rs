@@ -85,7 +85,7 @@ fn free_id(id: &str, taken: &mut BTreeSet<String>) -> String {
 
 /// Pieces of recipes, from which the page joins a recipe of whatever is picked.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct RecipeTexts {
+struct RecipeTexts {
     /// The lines before the first scene.
     pub(super) head: String,
     /// The text of each scene without its inputs, by the scene's id.
@@ -101,7 +101,7 @@ impl RecipeTexts {
     }
 
     /// The recipe of the best camera of every room that is offered, or of those that were chosen, each with the reason.
-    pub(super) fn of_best(&self, survey: &SurveyFile) -> String {
+    fn of_best(&self, survey: &SurveyFile) -> String {
         let mut text = self.head.clone();
         for house in &survey.houses {
             for room in &house.rooms {
@@ -126,7 +126,7 @@ fn head_text(options: &SurveyOptions) -> String {
 }
 
 /// A scene without its inputs, which follow it.
-pub(super) fn scene_text(options: &SurveyOptions, house: &str, room: &str, camera: &CandidateCamera) -> String {
+fn scene_text(options: &SurveyOptions, house: &str, room: &str, camera: &CandidateCamera) -> String {
     let shown = |path: &Path| quoted(&path.to_string_lossy().replace('\\', "/"));
     let mut keys = format!("house = {}, room = {}, models = {}", quoted(house), quoted(room), shown(&options.models));
     for (key, path) in [("textures", &options.textures), ("cameras", &options.cameras)] {
@@ -144,7 +144,7 @@ pub(super) fn scene_text(options: &SurveyOptions, house: &str, room: &str, camer
 }
 
 /// The files of a house and their SHA-256, which are the same for each of its rooms.
-pub(super) fn inputs_text(files: &[SourceFile]) -> String {
+fn inputs_text(files: &[SourceFile]) -> String {
     files.iter().fold("[scene.inputs]\n".to_owned(), |mut text, SourceFile { path, sha256 }| {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{} = \"{sha256}\"", quoted(path));
@@ -170,7 +170,7 @@ const TEMPLATE: &str = include_str!("page.j2");
 
 /// HTML that shows every candidate with its thumbnail and lists every rejected room with its reasons. A short script on
 /// the page joins the ticked candidates into a recipe at its end.
-pub(super) fn page(survey: &SurveyFile, texts: &RecipeTexts) -> String {
+fn page(survey: &SurveyFile, texts: &RecipeTexts) -> String {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| minijinja::AutoEscape::Html);
     let text = environment.render_str(TEMPLATE, context! { survey => Serde(survey), texts => Serde(texts) });
