@@ -10,7 +10,6 @@ use crate::error::PrepError;
 
 const INSTANCES: &str = "geometry/instances.glb";
 
-/// The meshes of a scene.
 pub struct Meshes {
     /// The nodes of `instances.glb`.
     pub instances: Vec<GlbNode>,

@@ -26,7 +26,6 @@ pub struct ViewScene<'a> {
     world: &'a World,
     /// The value in `instance.png` of every surface.
     instances: &'a [u16],
-    /// Whether each surface is scored.
     scored: &'a [bool],
     glow: Vec<Glow>,
 }
@@ -55,10 +54,8 @@ pub struct GeometryPictures {
     pub unobserved: Mask,
 }
 
-/// A triangle of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SeenTriangle {
-    /// Its surface.
     pub surface: SurfaceIndex,
     /// Its index among the surface's triangles.
     pub triangle: usize,
@@ -80,7 +77,6 @@ pub struct TruthPictures {
     pub diffuse_albedo: Picture<LinearRgb>,
     /// Perceptual roughness.
     pub roughness: Picture<f32>,
-    /// Metallic.
     pub metallic: Picture<f32>,
     /// Valid pixels whose centre is metallic or has a roughness below 0.2.
     pub specular_region: Mask,
@@ -89,21 +85,13 @@ pub struct TruthPictures {
 /// One pixel of all pictures, with the names of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewPixel {
-    /// See [`GeometryPictures::depth`].
     pub depth: f32,
-    /// See [`GeometryPictures::normal`].
     pub normal: [f32; 3],
-    /// See [`GeometryPictures::instance`].
     pub instance: u16,
-    /// See [`GeometryPictures::triangle`].
     pub triangle: Option<SeenTriangle>,
-    /// See [`GeometryPictures::valid`].
     pub valid: bool,
-    /// See [`GeometryPictures::unobserved`].
     pub unobserved: bool,
-    /// The means over the pixel.
     pub truth: PixelTruth,
-    /// See [`TruthPictures::specular_region`].
     pub specular: bool,
 }
 
@@ -116,7 +104,6 @@ pub struct PixelTruth {
     pub diffuse_albedo: [f32; 3],
     /// Perceptual roughness.
     pub roughness: f32,
-    /// Metallic.
     pub metallic: f32,
 }
 

@@ -121,7 +121,6 @@ impl ReleaseFile {
         self.verification.sound && self.comparisons().all(|verdict| verdict.agrees)
     }
 
-    /// The comparisons that were given.
     pub fn comparisons(&self) -> impl Iterator<Item = &SceneVerdict> {
         self.scenes.iter().filter_map(|scene| scene.comparison.as_ref())
     }
@@ -207,7 +206,6 @@ impl From<Day> for String {
 }
 
 impl Day {
-    /// The day as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -254,7 +252,6 @@ fn escaped(text: &str) -> String {
 /// In place of sentences that may quote the ground truth.
 pub(crate) const NOT_SHOWN: &str = "not shown, since the ground truth is withheld";
 
-/// Removes it.
 pub(crate) fn withhold(file: &mut ReleaseFile, commitment_sha256: String) {
     file.withheld = Some(Withheld { commitment_sha256 });
     file.verification.findings.iter_mut().for_each(silence);

@@ -59,7 +59,6 @@ impl SceneVerdict {
         }
     }
 
-    /// The number of all checks.
     pub fn total(&self) -> usize {
         self.checks.iter().map(|count| count.checks).sum()
     }
@@ -206,7 +205,6 @@ impl ReferenceScores {
     }
 }
 
-/// The ceiling and the floor.
 #[derive(Clone, Debug, Default)]
 pub struct Bounds {
     /// The scores of the truth.

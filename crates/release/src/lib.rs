@@ -37,9 +37,7 @@ use page::page;
 /// What to describe, and where to write the report.
 #[derive(Clone, Debug, Default)]
 pub struct ReleaseOptions {
-    /// The dataset's folder.
     pub dataset: PathBuf,
-    /// The report's folder.
     pub out: PathBuf,
     /// Replace a report that already exists.
     pub force: bool,
@@ -193,28 +191,18 @@ pub enum ReleaseError {
     /// out.
     #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
-    /// A folder of verdicts holds none: name another one.
     #[error(
         "'{}' holds no .json file; expected what `mateval prep compare --out` or `--format json` writes, in the folder \
          or directly below it",
         folder.display()
     )]
-    NoVerdicts {
-        /// The folder.
-        folder: PathBuf,
-    },
+    NoVerdicts { folder: PathBuf },
     /// A folder that is not the report of a release would be replaced: choose another one.
     #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
-    NotAReport {
-        /// The folder.
-        path: PathBuf,
-    },
+    NotAReport { path: PathBuf },
     /// The report would lie in the dataset: choose another place.
     #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
-    OutputInDataset {
-        /// The report's folder.
-        path: PathBuf,
-    },
+    OutputInDataset { path: PathBuf },
     /// The dataset, or a file of it, could not be read or written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),

@@ -35,7 +35,6 @@ struct Bound<'a> {
     scores: &'a ReferenceScores,
 }
 
-/// The page.
 pub(crate) fn page(file: &ReleaseFile) -> String {
     let scenes: Vec<ScenePage<'_>> = file
         .scenes
@@ -74,7 +73,6 @@ fn csp_hash(text: &str) -> String {
     format!("'sha256-{}'", base64::encode(Sha256::digest(text.as_bytes())))
 }
 
-/// A number at a glance.
 #[derive(Serialize)]
 struct Headline {
     value: String,
@@ -89,7 +87,6 @@ struct Failure {
     reasons: Vec<String>,
 }
 
-/// The numbers at a glance.
 fn headlines(file: &ReleaseFile) -> Vec<Headline> {
     let mut all = vec![scenes(file), verified(file), compared(file), noise(file)];
     all.extend(SHOWN_SCORES.map(|(title, key)| {

@@ -16,13 +16,10 @@ use cache::{AtlasCache, ShapeKey};
 /// A mesh that is to be unwrapped.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// The mesh.
     pub mesh: &'a TriangleMesh,
-    /// The size of its atlas.
     pub size: SizeWish,
 }
 
-/// Unwraps a mesh.
 pub fn unwrap(mesh: &TriangleMesh, size: SizeWish) -> Result<Unwrapped, AtlasError> {
     unwrap_copies(mesh, &[Wanted { mesh, size }], None).remove(0)
 }
@@ -89,13 +86,10 @@ impl SizeWish {
 /// Why a mesh has no atlas.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 pub enum AtlasError {
-    /// No triangle has an area.
     #[error("no triangle has an area")]
     NoArea,
-    /// Too many charts for the size.
     #[error("its {charts} charts do not fit into {size}x{size} texels with gutters of {GUTTER}")]
     DoesNotFit { charts: u32, size: u32 },
-    /// The mesh is damaged.
     #[error("the mesh cannot be unwrapped: {0}")]
     Refused(String),
 }
@@ -252,7 +246,6 @@ fn place_unmapped(layout: &mut AtlasLayout, has_chart: &[bool]) {
 pub(super) struct AtlasLayout {
     /// Texels a side.
     pub(super) size: u32,
-    /// Number of charts.
     pub(super) charts: u32,
     /// Number of triangles without a chart, since their area is negligible.
     pub(super) unmapped: usize,
@@ -271,7 +264,6 @@ pub struct Unwrapped {
     pub mesh: TriangleMesh,
     /// Texels a side.
     pub size: u32,
-    /// Number of charts.
     pub charts: u32,
     /// Share of the square that triangles cover, 0 to 1.
     pub coverage: f64,

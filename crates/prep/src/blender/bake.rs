@@ -50,15 +50,12 @@ pub struct Baked {
     pub world: Option<BakedWorld>,
     /// Area lamps, which are emitting rectangles in the GLB.
     pub lamps: Vec<BakedLamp>,
-    /// The materials of the GLB.
     pub materials: Vec<BakedMaterial>,
     /// Files that the scene needs besides its own, relative to its folder.
     pub files: Vec<String>,
     /// What was left out, replaced or approximated.
     pub findings: Vec<BakedFinding>,
-    /// Why the file is refused.
     pub faults: Vec<BakedFinding>,
-    /// Why baking failed.
     pub error: Option<String>,
 }
 
@@ -86,7 +83,6 @@ pub enum BakedWorld {
 pub struct BakedLamp {
     /// The name of its node.
     pub node: String,
-    /// Whether the camera sees it.
     pub visible: bool,
 }
 
@@ -103,7 +99,6 @@ pub struct BakedMaterial {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BakedFinding {
-    /// Its code.
     pub code: String,
     /// The object or material.
     pub place: String,

@@ -215,13 +215,11 @@ pub struct ResultView {
 /// What a job is written from.
 #[derive(Clone, Debug)]
 pub struct JobPlan<'a> {
-    /// The scene's id.
     pub scene: &'a SceneId,
     /// The scene. Its surface at position k is the instance with index k + 1.
     pub reference: &'a ReferenceScene,
     /// The value in `part.png` of every triangle of every surface.
     pub parts: &'a [Vec<u16>],
-    /// The views to render.
     pub views: Vec<JobView>,
     /// Samples per pixel of each half.
     pub samples_each_half: u32,

@@ -16,7 +16,6 @@ const POLL_INTERVAL: Duration = Duration::from_millis(100);
 #[derive(Clone, Debug)]
 pub struct BlenderProgram(pub PathBuf);
 
-/// Limits of one run.
 #[derive(Clone, Copy, Debug)]
 pub struct BlenderLimits {
     /// Longest time for one scene.
@@ -27,10 +26,8 @@ pub struct BlenderLimits {
     pub memory_bytes: u64,
 }
 
-/// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// The process ended by itself.
     Itself(ExitStatus),
     /// The process was killed, since it took longer than this limit.
     TooLong(Duration),

@@ -254,10 +254,8 @@ pub enum BakedMaterial {
     },
 }
 
-/// The result of baking.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baked {
-    /// The maps.
     pub material: BakedMaterial,
     /// Whether a base colour exceeded 0..1 and was clipped.
     pub clipped: bool,

@@ -44,10 +44,8 @@ use start::{
     SceneMark, begin, check_sources, finished_scene, label_files, make_relative, settings_sha256, source_folder,
 };
 
-/// The result of a build.
 #[derive(Clone, Debug, Default)]
 pub struct BuildReport {
-    /// The findings of every scene.
     pub findings: Vec<(SceneId, Vec<Finding>)>,
     /// Scenes that an earlier run had already made.
     pub resumed: Vec<SceneId>,
@@ -255,7 +253,6 @@ fn write_meshes(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) ->
     glb::write(&folder.instances(), &instances)
 }
 
-/// Writes `scene.json`.
 fn write_scene_file(
     plan: Plan,
     recipe: &Recipe,

@@ -37,7 +37,6 @@ pub struct InstanceEntry {
     pub id: InstanceId,
     /// Its value in `instance.png`.
     pub index: InstanceIndex,
-    /// Its role in the scene.
     pub role: Role,
     /// Its category, where the source states one.
     pub category: Option<String>,
@@ -83,20 +82,16 @@ fn unique_id(surface: &Surface, taken: &mut BTreeSet<String>) -> InstanceId {
 pub struct PartSplit {
     /// Its id; none for the source's own parts.
     pub id: Option<PartSetId>,
-    /// The parts of each instance.
     pub instances: Vec<InstanceParts>,
 }
 
-/// The parts of one instance.
 #[derive(Clone, Debug)]
 pub struct InstanceParts {
     /// The part of each of its triangles, as an index in `parts`.
     pub of_triangle: Vec<usize>,
-    /// Its parts.
     pub parts: Vec<PartEntry>,
 }
 
-/// One part.
 #[derive(Clone, Debug)]
 pub struct PartEntry {
     /// Its id, unique in its set.
@@ -184,69 +179,32 @@ const MAX_NAMES: usize = 10;
 /// Why a folder of labels cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LabelFault {
-    /// The folder has no file for any instance.
     #[error("part_labels: '{folder}' has no file '<instance>.npy' for any instance")]
-    NoFiles {
-        /// The folder.
-        folder: String,
-    },
-    /// The folder cannot be listed.
+    NoFiles { folder: String },
     #[error("part_labels: cannot list '{folder}': {source}")]
-    Unlistable {
-        /// The folder.
-        folder: String,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Unlistable { folder: String, source: std::io::Error },
     /// A file lies outside of the folder, cannot be read or is too large.
     #[error(transparent)]
     File(#[from] FileFault),
-    /// A file's size cannot be found out.
     #[error("cannot read '{file}': {source}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Unreadable { file: String, source: std::io::Error },
     /// A file is larger than the instance's labels can be.
     #[error("'{file}' has {found} bytes; expected {triangles} labels, at most {most} bytes")]
     TooLarge {
-        /// The file.
         file: String,
         /// Its size in bytes.
         found: u64,
         /// The largest size allowed, in bytes.
         most: u64,
-        /// Triangles of the instance.
         triangles: usize,
     },
-    /// A file is not an array of integers.
     #[error("'{file}': {source}")]
-    Array {
-        /// The file.
-        file: String,
-        /// The reason.
-        source: NpyError,
-    },
+    Array { file: String, source: NpyError },
     /// A file has another number of labels than its instance has triangles.
     #[error("'{file}' has {found} labels; expected {expected}, one for each triangle in the order of instances.glb")]
-    Count {
-        /// The file.
-        file: String,
-        /// Its labels.
-        found: usize,
-        /// Triangles of the instance.
-        expected: usize,
-    },
-    /// A file has too many different labels.
+    Count { file: String, found: usize, expected: usize },
     #[error("'{file}' has {found} different labels; expected at most {MAX_PARTS}")]
-    TooManyLabels {
-        /// The file.
-        file: String,
-        /// Its number of different labels.
-        found: usize,
-    },
+    TooManyLabels { file: String, found: usize },
     /// All labels together are more parts than pictures can hold.
     #[error(transparent)]
     TooMany(#[from] TooMany),

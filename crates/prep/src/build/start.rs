@@ -18,14 +18,11 @@ use crate::recipe::fault::{RecipeFault, RecipeSceneFault};
 use crate::recipe::{Recipe, RecipeScene, SourcePath};
 use crate::render::BlenderOptions;
 
-/// The inputs of a build.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
-    /// The recipe.
     pub recipe: PathBuf,
     /// The folder that the recipe's paths are relative to; if absent, the recipe's own.
     pub source: Option<PathBuf>,
-    /// The dataset's folder.
     pub out: PathBuf,
     /// Make only these scenes, and leave the files of the whole dataset to [`crate::build::finish`]; all scenes where empty.
     pub scenes: Vec<SceneId>,

@@ -30,7 +30,6 @@ use motion::{Amount, Motion, amounts, crossing};
 /// What to do with the furniture of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct PerturbOptions {
-    /// The kind of difference.
     pub kind: PerturbationKind,
     /// The level, at most [`most_level`]; 0 changes nothing.
     pub level: u32,
@@ -110,7 +109,6 @@ fn copy(from: &Path, to: &Path, file: &str) -> Result<(), PrepError> {
 /// What happened to a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PerturbedScene {
-    /// The scene.
     pub scene: SceneId,
     /// The number of pieces of furniture that were moved.
     pub moved: usize,

@@ -33,9 +33,7 @@ pub const MOST_SAMPLES: u32 = 1 << 16;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// The dataset's name.
     pub name: String,
-    /// The dataset's version.
     #[serde(default = "default_version")]
     pub version: String,
     /// Width and height in pixels; if absent, the source's own.
@@ -56,7 +54,6 @@ pub struct Recipe {
     /// Samples a pixel of each half of a rendered picture.
     #[serde(default = "default_samples")]
     pub samples: u32,
-    /// The scenes.
     #[serde(default, rename = "scene")]
     pub scenes: Vec<RecipeScene>,
 }
@@ -127,7 +124,6 @@ impl Recipe {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Offset {
-    /// The view's id.
     pub id: ViewId,
     /// Degrees about X; up is positive.
     pub x_deg: f64,
@@ -151,7 +147,6 @@ const DISTANCES_M: RangeInclusive<f64> = 0.05..=10.0;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "WideWords")]
 pub enum WideViews {
-    /// Drawn in each scene.
     Drawn(DrawnViews),
     /// At the same offsets in each scene.
     Given(Vec<WideOffset>),
@@ -160,11 +155,9 @@ pub enum WideViews {
 /// Wide views that are drawn until they stand in free space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawnViews {
-    /// Their number.
     pub count: u32,
     /// The distances of the first and the last from the input camera, in metres; those of the others lie evenly in between.
     pub distance_m: [f64; 2],
-    /// The seed of the draw.
     pub seed: u64,
 }
 

@@ -13,11 +13,9 @@ use super::fault::{FARTHEST_M, RecipeFault, RecipeSceneFault, check_sizes};
 /// The keys of a scene that name its source.
 const SOURCE_KEYS: [&str; 4] = ["bitterli", "front3d", "gltf", "blend"];
 
-/// One scene of a recipe.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeScene {
-    /// Its id.
     pub id: SceneId,
     /// The scene's Mitsuba XML. Every scene names exactly one source.
     pub bitterli: Option<PathBuf>,
@@ -60,7 +58,6 @@ pub struct RecipeScene {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Front3dRoom {
-    /// The house's JSON.
     pub house: PathBuf,
     /// The room's instanceid, as in `LivingDiningRoom-1912`.
     pub room: String,
@@ -101,22 +98,17 @@ impl Front3dRoom {
     }
 }
 
-/// The source of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecipeSource<'a> {
-    /// A Mitsuba XML.
     Bitterli(&'a Path),
     /// A room of a 3D-FRONT house.
     Front3d(&'a Front3dRoom),
-    /// A glTF.
     Gltf(&'a Path),
-    /// A Blender file.
     Blend(&'a Path),
 }
 
 /// A path that a scene's source needs.
 pub(crate) struct SourcePath {
-    /// The key in the recipe.
     pub(crate) key: &'static str,
     /// The path as the recipe states it.
     pub(crate) path: PathBuf,
@@ -255,7 +247,6 @@ pub enum RecipeCamera {
     Given(GivenCamera),
     /// Found by drawing cameras in the room until one sees enough. The same seed finds the same camera.
     Seed {
-        /// The seed of the draw.
         seed: u64,
         /// Vertical field of view in degrees; if absent, that of the recipe's camera rules.
         fov_y_deg: Option<f64>,

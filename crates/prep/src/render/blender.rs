@@ -30,12 +30,9 @@ const TAIL_BYTES: u64 = 1500;
 /// Cycles takes seeds below this number.
 const SEEDS: u64 = 1 << 31;
 
-/// How Blender is run.
 #[derive(Clone, Debug)]
 pub struct BlenderOptions {
-    /// The program to run.
     pub program: BlenderProgram,
-    /// Limits of one run.
     pub limits: BlenderLimits,
     /// Number of scenes rendered at once.
     pub jobs: usize,
@@ -262,10 +259,8 @@ impl BlenderScene<'_> {
     }
 }
 
-/// Why an attempt failed.
 struct Failure {
     what: String,
-    /// The end of the log.
     log: String,
     /// The command that repeats the attempt.
     repeat: String,

@@ -34,10 +34,8 @@ pub use blender::BlenderOptions;
 pub use run::{MAX_BOUNCES, RenderReport, RendererKind, UnknownRenderer};
 use run::{RenderRun, ViewRender, seed, seed_texts, write_view};
 
-/// What to render.
 #[derive(Clone, Debug, Default)]
 pub struct RenderOptions {
-    /// The renderer and its options.
     pub renderer: Renderer,
     /// Samples per pixel of each half; the recipe's number where absent.
     pub samples: Option<u32>,
@@ -47,7 +45,6 @@ pub struct RenderOptions {
     pub force: bool,
 }
 
-/// A renderer with its options.
 #[derive(Clone, Debug, Default)]
 pub enum Renderer {
     /// MatEval's own path tracer.
@@ -58,7 +55,6 @@ pub enum Renderer {
 }
 
 impl Renderer {
-    /// Which renderer it is.
     pub fn kind(&self) -> RendererKind {
         match self {
             Self::Builtin => RendererKind::Builtin,

@@ -18,7 +18,6 @@ use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
 use crate::views::write_preview;
 
-/// A renderer, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RendererKind {
@@ -64,7 +63,6 @@ impl std::fmt::Display for RendererKind {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{name}' is not a renderer; expected one of: {}", RendererKind::ALL.map(RendererKind::name).join(", "))]
 pub struct UnknownRenderer {
-    /// The name.
     pub name: String,
 }
 
@@ -77,10 +75,8 @@ impl FromStr for RendererKind {
     }
 }
 
-/// The result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct RenderReport {
-    /// Number of views rendered.
     pub rendered: usize,
     /// Number of views that an earlier run had rendered.
     pub kept: usize,
@@ -105,7 +101,6 @@ pub const MAX_BOUNCES: u32 = 16;
 
 /// The settings that all views of a run share.
 pub(super) struct RenderRun<'a> {
-    /// The dataset's folder.
     pub(super) root: &'a Path,
     pub(super) renderer: RendererId,
     /// Samples per pixel of each half.

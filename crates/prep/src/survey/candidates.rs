@@ -380,12 +380,10 @@ enum CameraRefusal {
     /// Too many pixels of the five views see the outside.
     #[error("{:.0} % of the pixels see the outside, expected at most {:.0} %", 100.0 * share, 100.0 * most)]
     SeesOutside {
-        /// The share found.
         share: f64,
         /// The largest share that the rules allow.
         most: f64,
     },
-    /// The input view sees too little furniture.
     #[error("it sees {seen} pieces of furniture, expected at least {least}")]
     SeesTooLittle {
         /// Number of pieces that it sees.

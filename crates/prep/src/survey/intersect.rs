@@ -43,7 +43,6 @@ const DIRECTIONS: [Vec3; 10] = [
 ];
 const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
-/// Two meshes that intersect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshIntersection {
     /// Their indices, the lower one first.
@@ -298,7 +297,6 @@ mod tests {
         mesh
     }
 
-    /// The mesh, moved.
     fn moved(mut mesh: TriangleMesh, by: Vec3) -> TriangleMesh {
         mesh.positions.iter_mut().for_each(|position| *position += by);
         mesh

@@ -32,7 +32,6 @@ pub use survey_file::{
     SurveyedRoom, TargetedMean,
 };
 
-/// The result of a survey.
 #[derive(Clone, Debug)]
 pub struct Surveyed {
     /// What was written as `survey.json`; none where only some houses were to be searched.
@@ -77,7 +76,6 @@ fn search_apart(search: &mut HouseSearch<'_>, house: &Path) -> Result<bool, Prep
     search.find(house)
 }
 
-/// The current folder.
 const HERE: &str = ".";
 
 /// Checks that everything that all houses need exists; otherwise each of them would report the same fault.
@@ -102,7 +100,6 @@ pub(super) fn source_folder(options: &SurveyOptions) -> Result<PathBuf, PrepErro
         .ok_or_else(|| PrepError::NoCommonFolder { path: options.models.clone() })
 }
 
-/// Every path that was given.
 fn given_paths(options: &SurveyOptions) -> impl Iterator<Item = &PathBuf> {
     options.houses.iter().chain([&options.models]).chain(&options.textures).chain(&options.cameras)
 }

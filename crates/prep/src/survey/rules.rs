@@ -14,7 +14,6 @@ use super::survey_file::{IntersectingPair, Rejection, SURVEY_FORMAT};
 use crate::error::PrepError;
 use crate::recipe::read_text;
 
-/// What to search, and how.
 #[derive(Clone, Debug)]
 pub struct SurveyOptions {
     /// Folder that all paths are relative to, as in a recipe. Where absent it is the current folder or, if a path is
@@ -47,7 +46,6 @@ pub struct SurveyOptions {
     pub only: Vec<String>,
     /// The scenes to choose; every accepted room where absent.
     pub goal: Option<SelectionGoal>,
-    /// Folder of the output.
     pub out: PathBuf,
     /// Replace a survey that already exists.
     pub force: bool,
@@ -75,7 +73,6 @@ pub struct SelectionRules {
     pub min_objects: usize,
     /// Largest number of pieces of furniture placed.
     pub max_objects: usize,
-    /// Smallest number of different super-categories.
     pub min_super_categories: usize,
     /// Longest sides of the bounding box of the floor, in metres.
     pub max_size_m: [f64; 2],

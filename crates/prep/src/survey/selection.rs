@@ -13,7 +13,6 @@ use super::survey_file::{Choice, ChosenType, Selection, SurveyedHouse, SurveyedR
 /// What the chosen scenes are to be like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelectionGoal {
-    /// Number of scenes.
     pub scenes: usize,
     /// The most scenes of one house.
     pub per_house: usize,
@@ -30,7 +29,6 @@ impl SelectionGoal {
     }
 }
 
-/// An accepted room.
 #[derive(Clone, Debug)]
 struct Candidate {
     /// Index of the house, and of the room in it.
