@@ -1,4 +1,4 @@
-//! The error of this crate.
+//! The error of this crate, whose recipes and scenes have faults of their own.
 
 use std::path::PathBuf;
 

@@ -1,5 +1,4 @@
-//! Compares the meshes of a finished scene, one for each instance and each part, with its `scene.json`, and collects the
-//! faults of a dataset on disk.
+//! Compares the meshes of a finished scene, one for each instance and each part, with its `scene.json`.
 
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::glb::{self, GlbNode};

@@ -1,5 +1,4 @@
-//! Makes the pictures of one view from one camera matrix: geometry for methods, and material truth for the scorer. Writes
-//! those of geometry, and the 8-bit preview that people look at.
+//! Makes the pictures of one view from one camera matrix: geometry for methods, and material truth for the scorer.
 
 use std::path::Path;
 

@@ -1,5 +1,9 @@
-//! `release.json`: everything that the report of a release states, for programs; what is known of a release besides its
-//! files, with how to cite it; and what must not become public while the ground truth is withheld.
+//! `release.json`: everything that the report of a release states, for programs.
+//!
+//! Here are also the facts about a publication that its files do not hold, with the citation, and what must not become
+//! public while the ground truth is withheld: everything that was measured on it in single scenes, and every sentence that
+//! may quote it. What remains of it are means over scenes, as a leaderboard shows them too, the counts of checks, and the
+//! settings of the renderer.
 
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -252,6 +256,7 @@ fn escaped(text: &str) -> String {
 /// In place of sentences that may quote the ground truth.
 pub(crate) const NOT_SHOWN: &str = "not shown, since the ground truth is withheld";
 
+/// Removes from a report what must not become public while the ground truth is withheld.
 pub(crate) fn withhold(file: &mut ReleaseFile, commitment_sha256: String) {
     file.withheld = Some(Withheld { commitment_sha256 });
     file.verification.findings.iter_mut().for_each(silence);

@@ -1,6 +1,8 @@
-//! What is gathered from the dataset: how the RGB truth was rendered and how noisy it is, small pictures of the input views,
-//! the hashes of the inputs and their licences, the commands that make the release again, and the paper's Table I with a
-//! column for the release.
+//! What a release's report gathers from the dataset.
+//!
+//! This is how the RGB truth was rendered and how noisy it is, small pictures of the input views (for which only files
+//! outside of `ground_truth` are read), the hashes of the inputs and their licences, the commands that make the release
+//! again, and the paper's Table I with a column for the release.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -23,7 +25,7 @@ use mateval_scene::{RendererId, SceneError, SceneId, ViewId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::ReleaseError;
+use crate::given::ReleaseError;
 
 /// The noise of one view of the photo's renderer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,6 +1,7 @@
-//! The files that are given for the report: the verdicts of `prep compare`, whether two renderers agree on a scene; and the
-//! ceiling and the floor, the scores of the truth itself and of a constant estimate, read from results. Each file must be
-//! about this dataset.
+//! The files that are given for a release's report, each of which must be about its dataset.
+//!
+//! These are the verdicts of `prep compare`, whether two renderers agree on a scene; and the results that give the ceiling
+//! and the floor, the scores of the truth itself and of a constant estimate.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,41 @@ use mateval_scene::{Finding, SceneError, SceneId, Severity, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::ReleaseError;
+/// Why a release could not be described.
+#[derive(Debug, thiserror::Error)]
+pub enum ReleaseError {
+    /// Files that were given are not about this dataset, or are something else: every reason. Correct them, or leave them
+    /// out.
+    #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
+    UnfitFiles(Vec<Finding>),
+    #[error(
+        "'{}' holds no .json file; expected what `mateval prep compare --out` or `--format json` writes, in the folder \
+         or directly below it",
+        folder.display()
+    )]
+    NoVerdicts { folder: PathBuf },
+    /// A folder that is not the report of a release would be replaced: choose another one.
+    #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
+    NotAReport { path: PathBuf },
+    /// The report would lie in the dataset: choose another place.
+    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
+    OutputInDataset { path: PathBuf },
+    /// The dataset, or a file of it, could not be read or written.
+    #[error(transparent)]
+    Dataset(#[from] mateval_scene::SceneError),
+    /// The dataset could not be examined.
+    #[error(transparent)]
+    Audit(#[from] mateval_audit::AuditError),
+    /// A result could not be checked.
+    #[error(transparent)]
+    Eval(#[from] mateval_eval::EvalError),
+    /// The recipe could not be read.
+    #[error(transparent)]
+    Prep(#[from] mateval_prep::PrepError),
+    /// A picture could not be read or written.
+    #[error(transparent)]
+    Image(#[from] mateval_image::ImageError),
+}
 
 /// All states, in the order in which they are counted.
 const STATES: [State; 6] =

@@ -31,6 +31,7 @@ use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, scene_co
 pub use file::{Publication, ReleaseFile};
 use file::{RELEASE, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, bibtex, withhold};
 use gathered::{Evaluated, Remake, SceneInputs, licences, noise, rendered_with, without_licence, write_thumbnail};
+pub use given::ReleaseError;
 use given::{Bounds, SceneVerdict, read_bounds, read_comparisons};
 use page::page;
 
@@ -182,42 +183,6 @@ fn check_place(options: &ReleaseOptions) -> Result<(), ReleaseError> {
         return Err(ReleaseError::NotAReport { path: out.clone() });
     }
     Ok(check_free(out, options.force, "--report")?)
-}
-
-/// Why a release could not be described.
-#[derive(Debug, thiserror::Error)]
-pub enum ReleaseError {
-    /// Files that were given are not about this dataset, or are something else: every reason. Correct them, or leave them
-    /// out.
-    #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
-    UnfitFiles(Vec<Finding>),
-    #[error(
-        "'{}' holds no .json file; expected what `mateval prep compare --out` or `--format json` writes, in the folder \
-         or directly below it",
-        folder.display()
-    )]
-    NoVerdicts { folder: PathBuf },
-    /// A folder that is not the report of a release would be replaced: choose another one.
-    #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
-    NotAReport { path: PathBuf },
-    /// The report would lie in the dataset: choose another place.
-    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
-    OutputInDataset { path: PathBuf },
-    /// The dataset, or a file of it, could not be read or written.
-    #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
-    /// The dataset could not be examined.
-    #[error(transparent)]
-    Audit(#[from] mateval_audit::AuditError),
-    /// A result could not be checked.
-    #[error(transparent)]
-    Eval(#[from] mateval_eval::EvalError),
-    /// The recipe could not be read.
-    #[error(transparent)]
-    Prep(#[from] mateval_prep::PrepError),
-    /// A picture could not be read or written.
-    #[error(transparent)]
-    Image(#[from] mateval_image::ImageError),
 }
 
 // OLD PATHS, removed after the merge.

@@ -1,5 +1,6 @@
-//! The page, `index.html`: one file with its style and script, beside which only pictures lie. Its first lines are numbers
-//! at a glance, what fails, and what was not given.
+//! The page, `index.html`: one file with its style and script, beside which only pictures lie.
+//!
+//! Its first lines are numbers at a glance, what fails, and what was not given.
 
 use mateval_report::page_style::{SORT, STYLE};
 use mateval_scene::{Finding, Severity};

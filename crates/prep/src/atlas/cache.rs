@@ -12,10 +12,10 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::bounded_cache::{keep_below, mark_used};
 use mateval_scene::manifest::sha256_of_bytes;
 
-use super::{AtlasError, AtlasLayout, SizeWish};
+use super::packing::{AtlasError, AtlasLayout, SizeWish};
 
 /// What makes layouts. A cache never holds what another version made.
-const MAKERS: [&str; 2] = ["uvunwrap 0.2.0", include_str!("mod.rs")];
+const MAKERS: [&str; 2] = ["uvunwrap 0.2.0", include_str!("packing.rs")];
 /// Size of the largest file that is read, in bytes.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 /// The largest size of a cache, in bytes.

@@ -1,5 +1,6 @@
-//! Runs Blender as a process, and kills it when it exceeds a limit of time or memory. The scripts that Blender runs are
-//! embedded when this program is built.
+//! Runs Blender as a process, and kills it when it exceeds a limit of time or memory.
+//!
+//! The scripts that Blender runs are embedded when this program is built.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};

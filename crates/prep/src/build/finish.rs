@@ -1,5 +1,7 @@
-//! Writes the files that describe a whole dataset, once its scenes are made: `dataset.json`, `targets.json`, the recipe and
-//! the manifest. Files of scenes are not read again where their hashes are known.
+//! Writes the files that describe a whole dataset, once its scenes are made.
+//!
+//! These are `dataset.json`, `targets.json`, the recipe and the manifest. Files of scenes are not read again where their
+//! hashes are known.
 //!
 //! [`bring_up_to_date`] does so for a dataset of the format before this one, from what it holds. `mateval/3` differs from
 //! `mateval/2` in the word of its JSON files, in a key of `dataset.json` and in the pictures that scores under light are

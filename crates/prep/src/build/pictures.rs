@@ -1,5 +1,7 @@
-//! Writes the pictures of every view of a scene, and refuses scenes that would be built into a wrong truth: much of the
-//! source is missing, base colours are not stated, or no light reaches the picture. The recipe may allow the first two.
+//! Writes the pictures of every view of a scene, and refuses scenes that would be built into a wrong truth.
+//!
+//! These are scenes in which much of the source is missing, base colours are not stated, or no light reaches the picture.
+//! The recipe may allow the first two.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

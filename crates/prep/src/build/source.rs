@@ -1,5 +1,4 @@
-//! Reads a recipe's scene from its source and chooses the input camera; and the photo that a scene may bring in place of a
-//! rendered input picture.
+//! Reads a recipe's scene from its source, chooses the input camera, and reads the photo if the scene has one.
 
 use std::path::Path;
 

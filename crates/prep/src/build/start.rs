@@ -1,5 +1,7 @@
-//! Begins a build in a new folder, or resumes one that was begun there: checks that the files that the scenes are made of
-//! exist and are those that the recipe pins, and knows by a mark for each scene which ones an earlier run has made.
+//! Begins a build in a new folder, or resumes one that was begun there.
+//!
+//! The files that the scenes are made of must exist and be those that the recipe pins. Each scene that is made leaves a
+//! mark, by which a later run finds that it need not make the scene again.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
-//! The displacement of one piece of furniture, as a function of place, by the level of its kind of perturbation. The
-//! directions depend on seed and instance alone, so that a higher level moves a piece the same way further.
+//! The displacement of one piece of furniture, as a function of place, by the level of its kind of perturbation.
+//!
+//! The directions depend on seed and instance alone, so that a higher level moves a piece the same way further.
 
 use std::f64::consts::TAU;
 

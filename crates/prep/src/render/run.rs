@@ -1,5 +1,6 @@
-//! What all renderers share: their names, the settings of a run, what it reports, and a view's pictures on disk, in
-//! `ground_truth/renders/<renderer>/<view>/`.
+//! What all renderers share: their names, the settings of a run, its report, and a view's pictures on disk.
+//!
+//! The pictures lie in `ground_truth/renders/<renderer>/<view>/`.
 
 use std::path::Path;
 use std::str::FromStr;

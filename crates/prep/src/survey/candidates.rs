@@ -1,5 +1,4 @@
-//! The rooms of one house: their properties, the cameras that are tried in them, drawn and designers', with what these see
-//! or why they are not offered.
+//! The rooms of one house: their properties, and cameras in them with what these see or why they are not offered.
 
 use std::collections::BTreeSet;
 

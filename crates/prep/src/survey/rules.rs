@@ -1,5 +1,6 @@
-//! What a survey is asked for, and which rooms become scenes: limits in a TOML file, and lists of rooms, houses and models
-//! that are known to be bad.
+//! What a survey is asked for, and which rooms become scenes.
+//!
+//! The conditions are limits in a TOML file, and lists of rooms, houses and models that are known to be bad.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
