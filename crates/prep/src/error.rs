@@ -20,6 +20,13 @@ pub enum PrepError {
         path: PathBuf,
         source: std::io::Error,
     },
+    /// A file or folder is not what the command needs, or must not be replaced.
+    #[error("'{}' {why}", path.display())]
+    Unusable {
+        path: PathBuf,
+        /// The rest of the message: what is wrong, and what to do.
+        why: &'static str,
+    },
     /// The recipe is not valid, or its sources are missing; all faults are listed.
     #[error("recipe '{}': {}", path.display(), joined(faults))]
     Recipe { path: PathBuf, faults: Vec<RecipeFault> },
@@ -60,30 +67,14 @@ pub enum PrepError {
         /// The largest number of rows of all lists together.
         most: usize,
     },
-    #[error("'{}' does not exist; correct the path, or name its folder with --source", path.display())]
-    MissingInput { path: PathBuf },
-    #[error("'{}' contains no house; expected JSON files of 3D-FRONT", path.display())]
-    NoHouses { path: PathBuf },
     /// A house that was named alone is none of the survey's.
     #[error(
         "'{name}' is none of the survey's {houses} houses; name one by its file relative to --source, or by the file's name"
     )]
     UnknownHouse { name: String, houses: usize },
-    /// The paths given to a survey lie in no common folder.
-    #[error("'{}' has no folder in common with the other paths; put them into one and name it with --source", path.display())]
-    NoCommonFolder { path: PathBuf },
     /// A path given to a survey does not lie in the source's folder.
     #[error("{0}; a recipe cannot refer to it: name the folder that contains all inputs with --source")]
     OutsideSource(#[from] mateval_sources::below::BelowError),
-    /// The output of a survey exists and is not a survey.
-    #[error("'{}' exists and is not a survey; it is not replaced: choose another --out", path.display())]
-    NotASurvey { path: PathBuf },
-    #[error(
-        "'{}' lacks MANIFEST.sha256 or dataset.json: its build did not finish; run `prep build` again, or `prep finish` \
-         where all scenes are made",
-        path.display()
-    )]
-    UnfinishedBuild { path: PathBuf },
     /// A renderer made a picture of another size than the camera's.
     #[error(
         "scene '{scene}', view '{view}': the rendered picture has {}x{} pixels, expected {}x{}",
@@ -118,10 +109,6 @@ pub enum PrepError {
         /// The scenes that the recipe lacks.
         dropped: Vec<SceneId>,
     },
-    #[error("'{}' would have no scene left; leave one --without away", path.display())]
-    NoSceneLeft { path: PathBuf },
-    #[error("'{}' was not built here, so --without cannot leave scenes out of it", path.display())]
-    NotBuiltHere { path: PathBuf },
     #[error(
         "'{}' lacks {} of the recipe: {}; make them by `prep build --scene`, or finish without them by --without",
         path.display(), counted_scenes(scenes), quoted(scenes)
@@ -133,13 +120,6 @@ pub enum PrepError {
         path.display(), names.join("', '")
     )]
     StrayScenes { path: PathBuf, names: Vec<String> },
-    #[error(
-        "'{}' holds a finished dataset without the `.build` of its making; --force without --scene replaces it as a whole",
-        path.display()
-    )]
-    FinishedDataset { path: PathBuf },
-    #[error("'{}' exists and is not a dataset; it is not replaced: choose another --out", path.display())]
-    NotADataset { path: PathBuf },
     #[error("scene '{scene}': {fault}")]
     Scene { scene: SceneId, fault: Box<SceneFault> },
     /// The source could not be read at all.
@@ -161,6 +141,10 @@ impl PrepError {
     pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { action, path, source }
+    }
+    /// A [`PrepError::Unusable`].
+    pub(crate) fn unusable(path: impl Into<PathBuf>, why: &'static str) -> Self {
+        Self::Unusable { path: path.into(), why }
     }
     /// A [`PrepError::Scene`]; to be used with `map_err`.
     pub(crate) fn scene<E: Into<SceneFault>>(scene: &SceneId) -> impl FnOnce(E) -> Self {

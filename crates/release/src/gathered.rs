@@ -162,16 +162,12 @@ pub(crate) fn write_thumbnail(
     let small = reduced(&png_io::read_srgb(&path)?.to_linear());
     let bytes = small.map(|LinearRgb(rgb)| rgb.map(|v| byte_from_unit(srgb_from_linear(v))));
     let jpeg = jpeg_bytes(&bytes, QUALITY).expect("a picture of 1 to 240 columns has a JPEG");
-    let file = thumbnail_file(&scene.id);
+    let file = format!("{PICTURES}/{}.jpg", scene.id);
     let place = out.join(&file);
     let folder = place.parent().unwrap_or(out);
     std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
     write_whole(&place, &jpeg)?;
     Ok(Some(Thumbnail { file, width: small.width(), height: small.height() }))
-}
-
-fn thumbnail_file(scene: &SceneId) -> String {
-    format!("{PICTURES}/{scene}.jpg")
 }
 
 /// The means of square blocks of pixels, of at most [`MOST_WIDTH`] blocks in a row. The last column and row may be cut.

@@ -106,6 +106,7 @@ impl<'a> CheckedRelease<'a> {
     ) -> Result<ReleaseFile, ReleaseError> {
         let dataset = &self.dataset;
         let rendered = rendered_with(dataset)?;
+        let sound = findings.iter().all(|finding| finding.severity != Severity::Error);
         let mut scenes = Vec::new();
         for (at, scene) in dataset.scenes.iter().enumerate() {
             progress(Report::step("pictures", at, dataset.scenes.len()));
@@ -114,13 +115,18 @@ impl<'a> CheckedRelease<'a> {
         let mut file = ReleaseFile {
             format: RELEASE_FORMAT.to_owned(),
             tool: tool.to_owned(),
-            dataset: released(dataset),
+            dataset: ReleasedDataset {
+                name: dataset.file.name.clone(),
+                version: dataset.file.version.clone(),
+                manifest_sha256: dataset.file.manifest_sha256.clone(),
+                photo_renderer: dataset.file.photo_renderer.clone(),
+            },
             publication: self.options.publication.clone(),
             citation: bibtex(&dataset.file, &self.options.publication),
             withheld: None,
             stats: stats::count(dataset, tool)?,
             evaluated: Evaluated::of(dataset)?,
-            verification: verification(findings),
+            verification: Verification { sound, findings },
             ceiling: self.bounds.ceiling.clone(),
             floor: self.bounds.floor.clone(),
             remake: Remake::of(dataset, &rendered)?,
@@ -152,19 +158,6 @@ impl<'a> CheckedRelease<'a> {
     fn lacks_truth(&self) -> bool {
         self.dataset.scenes.iter().any(|scene| !self.dataset.folder(&scene.id).truth().is_dir())
     }
-}
-
-fn released(dataset: &Dataset) -> ReleasedDataset {
-    ReleasedDataset {
-        name: dataset.file.name.clone(),
-        version: dataset.file.version.clone(),
-        manifest_sha256: dataset.file.manifest_sha256.clone(),
-        photo_renderer: dataset.file.photo_renderer.clone(),
-    }
-}
-
-fn verification(findings: Vec<Finding>) -> Verification {
-    Verification { sound: findings.iter().all(|finding| finding.severity != Severity::Error), findings }
 }
 
 /// Fails where the report would lie in the dataset, replace an input, or replace anything but a report.

@@ -61,7 +61,7 @@ fn finish_with(
     if !is_build(root) {
         return match without.is_empty() {
             true => finish_again(root, progress),
-            false => Err(PrepError::NotBuiltHere { path: root.to_owned() }),
+            false => Err(PrepError::unusable(root, "was not built here, so --without cannot leave scenes out of it")),
         };
     }
     let build = BuildFolder::of(root);
@@ -75,7 +75,7 @@ fn finish_with(
     manifest::remove_unfinished(&root.join("scenes"))?;
     let scenes: Vec<SceneId> = all.iter().filter(|id| !without.contains(id)).cloned().collect();
     if scenes.is_empty() {
-        return Err(PrepError::NoSceneLeft { path: root.to_owned() });
+        return Err(PrepError::unusable(root, "would have no scene left; leave one --without away"));
     }
     check_strays(root, &all)?;
     check_made(root, &recipe, &scenes, tool)?;

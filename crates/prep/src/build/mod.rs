@@ -119,7 +119,7 @@ fn make_scene(
     let labels = label_files(entry, source);
     let cache = options.atlas_cache.as_deref().map(AtlasCache::new);
     let at = SceneFolder::at(work.path().to_owned());
-    let Built { licence, absent } =
+    let (licence, absent) =
         build_scene(recipe, entry, source, options.blender.as_ref(), &at, cache.as_ref(), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
     let made = SceneMark { settings_sha256, licence, absent, labels };
@@ -132,15 +132,9 @@ fn make_scene(
     Ok(json::write(&mark, &made)?)
 }
 
-/// The facts about a finished scene that its folder does not hold.
-struct Built {
-    /// The licence that came with it.
-    licence: Option<LicenceText>,
-    /// Files that were looked for but do not exist, with paths as in `scene.json`; sorted.
-    absent: Vec<String>,
-}
-
-/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases are taken from the cache where it holds them.
+/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases are
+/// taken from the cache where it holds them. Returns what the folder does not hold: the licence that came with the source,
+/// and the files that were looked for but do not exist, with paths as in `scene.json`; sorted.
 fn build_scene(
     recipe: &Recipe,
     entry: &RecipeScene,
@@ -149,7 +143,7 @@ fn build_scene(
     folder: &SceneFolder,
     cache: Option<&AtlasCache>,
     progress: Progress<'_>,
-) -> Result<Built, PrepError> {
+) -> Result<(Option<LicenceText>, Vec<String>), PrepError> {
     // The source, with numbered instances and parts.
     progress(Report::step("read the source", 0, 1));
     let read = read_source(recipe, entry, source, &Baking { blender, folder: folder.path(), progress })?;
@@ -196,7 +190,7 @@ fn build_scene(
         json::write(&folder.material_classes(), &file)?;
     }
     write_scene_file(plan, recipe, entry, &atlases, folder)?;
-    Ok(Built { licence, absent })
+    Ok((licence, absent))
 }
 
 /// Fails if the recipe pins files and any file that was read or pinned differs.

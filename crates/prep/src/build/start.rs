@@ -194,11 +194,15 @@ pub(super) fn begin(
 
 /// Fails where the folder must not be written to.
 fn check_place(options: &BuildOptions, place: Place) -> Result<(), PrepError> {
-    let path = || options.out.clone();
     match place {
-        Place::Other => Err(PrepError::NotADataset { path: path() }),
+        Place::Other => Err(PrepError::unusable(
+            &options.out,
+            "exists and is not a dataset; it is not replaced: choose another --out",
+        )),
         Place::Dataset if !options.force || !options.scenes.is_empty() => {
-            Err(PrepError::FinishedDataset { path: path() })
+            let why = "holds a finished dataset without the `.build` of its making; --force \
+                       without --scene replaces it as a whole";
+            Err(PrepError::unusable(&options.out, why))
         }
         _ => Ok(()),
     }

@@ -17,7 +17,6 @@ use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
 use crate::error::PrepError;
-pub use fault::ATLAS_SIZES;
 pub(crate) use fault::RESOLUTION;
 use fault::{RecipeFault, check_sizes};
 pub(crate) use scene::SourcePath;

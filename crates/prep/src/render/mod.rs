@@ -83,6 +83,9 @@ impl Renderer {
     }
 }
 
+const UNFINISHED: &str = "lacks MANIFEST.sha256 or dataset.json: its build did not finish; run `prep build` again, or \
+         `prep finish` where all scenes are made";
+
 /// Renders the dataset in `root`. Where no scenes are chosen, it then names the photo renderer and writes a new manifest;
 /// otherwise [`crate::build::finish`] does so, and several processes may render different scenes at once.
 ///
@@ -92,11 +95,11 @@ impl Renderer {
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let build_recipe = is_build(root).then(|| BuildFolder::of(root).recipe());
     if build_recipe.is_some() && !root.join(DATASET).is_file() {
-        return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
+        return Err(PrepError::unusable(root, UNFINISHED));
     }
     let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
     if !root.join(MANIFEST).is_file() {
-        return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
+        return Err(PrepError::unusable(root, UNFINISHED));
     }
     if options.scenes.is_empty() {
         // `finish_again` would find them when all is rendered.

@@ -186,7 +186,10 @@ impl SurveyFolder {
         let is_new = !out.exists() || holds_only(out, &[WORK, THUMBNAILS]);
         let key = json::read::<WorkKey>(&out.join(WORK).join("key.json"));
         if !is_new && !key.is_ok_and(|key| key.format == KEY_FORMAT) {
-            return Err(PrepError::NotASurvey { path: out.clone() });
+            return Err(PrepError::unusable(
+                out,
+                "exists and is not a survey; it is not replaced: choose another --out",
+            ));
         }
         // What is not finished is resumed.
         if self.file(SURVEY).exists() {

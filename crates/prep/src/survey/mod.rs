@@ -28,8 +28,8 @@ use house::{HouseName, HouseSearch, SurveyFolder, shown};
 use output::merge;
 pub use rules::SurveyOptions;
 pub use survey_file::{
-    CandidateCamera, Choice, ChosenType, IntersectingPair, SURVEY, SURVEY_FORMAT, Selection, SurveyFile, SurveyedHouse,
-    SurveyedRoom, TargetedMean,
+    CandidateCamera, Choice, ChosenType, IntersectingPair, Selection, SurveyFile, SurveyedHouse, SurveyedRoom,
+    TargetedMean,
 };
 
 #[derive(Clone, Debug)]
@@ -85,7 +85,8 @@ fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
     let missing_folder = folders.map(|path| source.join(path)).find(|path| !path.is_dir());
     let files = options.cameras.iter().chain(&options.houses).map(|path| source.join(path));
     let missing = missing_folder.or_else(|| files.into_iter().find(|path| !path.exists()));
-    missing.map_or(Ok(()), |path| Err(PrepError::MissingInput { path }))
+    let why = "does not exist; correct the path, or name its folder with --source";
+    missing.map_or(Ok(()), |path| Err(PrepError::unusable(path, why)))
 }
 
 /// The folder that all paths become relative to.
@@ -96,8 +97,8 @@ pub(super) fn source_folder(options: &SurveyOptions) -> Result<PathBuf, PrepErro
     if given_paths(options).all(|path| relative_below(path, Path::new(HERE)).is_ok()) {
         return Ok(HERE.into());
     }
-    common_folder(given_paths(options).map(PathBuf::as_path))
-        .ok_or_else(|| PrepError::NoCommonFolder { path: options.models.clone() })
+    let why = "has no folder in common with the other paths; put them into one and name it with --source";
+    common_folder(given_paths(options).map(PathBuf::as_path)).ok_or_else(|| PrepError::unusable(&options.models, why))
 }
 
 fn given_paths(options: &SurveyOptions) -> impl Iterator<Item = &PathBuf> {
@@ -142,7 +143,10 @@ pub(super) fn house_files(options: &SurveyOptions, source: &Path) -> Result<Vec<
     }
     let mut seen = BTreeSet::new();
     files.retain(|file| seen.insert(source.join(file).canonicalize().ok().unwrap_or_else(|| file.clone())));
-    if files.is_empty() { Err(PrepError::NoHouses { path: source.to_owned() }) } else { Ok(files) }
+    match files.is_empty() {
+        true => Err(PrepError::unusable(source, "contains no house; expected JSON files of 3D-FRONT")),
+        false => Ok(files),
+    }
 }
 
 /// The houses that `only` names, or all where it names none. Fails where a name is no house's.
