@@ -4,10 +4,10 @@
 //! The output is a dataset's folder as `dataset_spec/FORMAT.md` describes it.
 //!
 //! The steps: [`recipe`] reads and checks the whole recipe. [`build`] then makes scene by scene: it reads the source by
-//! [`mateval_sources`], numbers instances and parts, makes the pictures of the [`views`], unwraps the instances by [`atlas`]
-//! and bakes their materials, which [`conversion`] brings to the scored model. [`render`] adds the RGB truth, with
-//! [`blender`] where that is the renderer. [`scene_meshes`] compares a finished scene with its meshes. [`survey`] lists the
-//! rooms that a recipe could name. [`perturb`] copies what methods see, with other geometry.
+//! [`mateval_sources`], numbers instances and parts, makes the pictures of the [`views`], unwraps the instances by
+//! [`atlas`] and bakes their materials, which [`conversion`] brings to the scored model. [`render`] adds the RGB truth,
+//! with [`blender`] where that is the renderer. [`scene_meshes`] compares a finished scene with its meshes. [`survey`]
+//! lists the rooms that a recipe could name. [`perturb`] copies what methods see, with other geometry.
 
 pub mod atlas;
 pub mod blender;

@@ -112,8 +112,8 @@ impl<'a> ViewScene<'a> {
         Self { world, instances, scored, glow: glow_of_surfaces(reference) }
     }
 
-    /// The pictures that `camera` sees. Pixels whose surface point `input` does not show are unobserved; the input view itself
-    /// has none.
+    /// The pictures that `camera` sees. Pixels whose surface point `input` does not show are unobserved; the input view
+    /// itself has none.
     pub fn pictures(&self, camera: &Camera, input: &Camera) -> (GeometryPictures, TruthPictures) {
         let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
         let pixels: Vec<ViewPixel> = (0..height)
@@ -294,7 +294,8 @@ mod tests {
 
     use super::*;
 
-    /// A lamp with a map emits on the same sides as one without; a lamp without radiance, or hidden from the camera, on none.
+    /// A lamp with a map emits on the same sides as one without; a lamp without radiance, or hidden from the camera, on
+    /// none.
     #[test]
     fn maps_do_not_change_the_sides_that_emit() {
         let glow = |radiance: f32, mapped: bool, two_sided: bool, camera_visible: bool| {

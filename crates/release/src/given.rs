@@ -248,9 +248,9 @@ pub struct Bounds {
     pub floor: Option<ReferenceScores>,
 }
 
-/// Reads the results of the ceiling and the floor under the protocol. Fails with every reason for which one of them does not
-/// fit: it is something else, was made on another dataset, contradicts its own numbers or its fingerprint, or has no scores
-/// under the protocol; or both depend on different rules.
+/// Reads the results of the ceiling and the floor under the protocol. Fails with every reason for which one of them
+/// does not fit: it is something else, was made on another dataset, contradicts its own numbers or its fingerprint, or
+/// has no scores under the protocol; or both depend on different rules.
 pub fn read_bounds(
     ceiling: Option<&Path>,
     floor: Option<&Path>,

@@ -84,7 +84,8 @@ impl<'a> CheckedRelease<'a> {
         }
     }
 
-    /// Verifies the dataset and writes the report, completely or not at all. `tool` is the name and version that it records.
+    /// Verifies the dataset and writes the report, completely or not at all. `tool` is the name and version that it
+    /// records.
     pub fn write(&self, tool: &str, progress: Progress<'_>) -> Result<ReleaseFile, ReleaseError> {
         let findings = verify::verify(&self.options.dataset, progress)?;
         // The caller may have written folders since.

@@ -1,10 +1,10 @@
 //! Renders with Blender's Cycles, and has Blender [`bake`] its own files.
 //!
 //! In: a reference scene, the parts of its instances, and views. Out: [`BlenderView`]s. Between: a job for
-//! `blender_scripts/render.py`, which is a folder with `job.json`, meshes as raw little-endian numbers and textures as linear
-//! EXR files; `process` copies the scripts into it, runs Blender and enforces limits; multi-layer EXR files hold the pictures
-//! of each view. Textures are decoded here, since Cycles interpolates 8-bit sRGB before it decodes it, while the built-in
-//! tracer decodes first.
+//! `blender_scripts/render.py`, which is a folder with `job.json`, meshes as raw little-endian numbers and textures as
+//! linear EXR files; `process` copies the scripts into it, runs Blender and enforces limits; multi-layer EXR files hold
+//! the pictures of each view. Textures are decoded here, since Cycles interpolates 8-bit sRGB before it decodes it,
+//! while the built-in tracer decodes first.
 
 pub mod bake;
 mod process;

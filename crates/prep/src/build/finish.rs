@@ -364,7 +364,8 @@ fn raise_file(path: &Path) -> Result<(), PrepError> {
     Ok(())
 }
 
-/// The text with the new format in place of the previous one. Only that word is replaced, so that numbers keep their digits.
+/// The text with the new format in place of the previous one. Only that word is replaced, so that numbers keep their
+/// digits.
 fn raised(path: &Path, bytes: &[u8]) -> Result<String, PrepError> {
     let text = String::from_utf8_lossy(bytes).replacen(&quoted(PREVIOUS_FORMAT), &quoted(FORMAT), 1);
     if format_of(text.as_bytes()).as_deref() == Some(FORMAT) {

@@ -46,8 +46,8 @@ impl Seen {
     }
 }
 
-/// A surface that is nearer than this, in metres, fills the picture with a few texels; one that contains the camera fills it
-/// with noise.
+/// A surface that is nearer than this, in metres, fills the picture with a few texels; one that contains the camera
+/// fills it with noise.
 const TOO_NEAR_M: f64 = 0.001;
 
 /// Writes the pictures of every view. `scored` states for each instance whether it has an atlas.

@@ -1,9 +1,9 @@
 //! Plans a scene before anything is written: its instances, parts and views.
 //!
-//! Wide views, those from other places than the input view's, all look at the point that the middle of the input view shows
-//! at the median depth of that view. Those that are drawn stand in free space, in reach of the input camera, see mostly what
-//! the scene holds and partly what the input view saw; of those that do, the one is taken whose picture shows most that the
-//! input view did not.
+//! Wide views, those from other places than the input view's, all look at the point that the middle of the input view
+//! shows at the median depth of that view. Those that are drawn stand in free space, in reach of the input camera, see
+//! mostly what the scene holds and partly what the input view saw; of those that do, the one is taken whose picture
+//! shows most that the input view did not.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -287,8 +287,8 @@ struct Judge<'a> {
     scene: ViewScene<'a>,
     input: Camera,
     target: DVec3,
-    /// The distance in metres that a place keeps from everything: that of drawn input cameras, or the input camera's own where
-    /// that is smaller.
+    /// The distance in metres that a place keeps from everything: that of drawn input cameras, or the input camera's
+    /// own where that is smaller.
     clearance_m: f64,
     valid: f64,
     outside: f64,

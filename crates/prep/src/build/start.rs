@@ -26,7 +26,8 @@ pub struct BuildOptions {
     /// The folder that the recipe's paths are relative to; if absent, the recipe's own.
     pub source: Option<PathBuf>,
     pub out: PathBuf,
-    /// Make only these scenes, and leave the files of the whole dataset to [`crate::build::finish`]; all scenes where empty.
+    /// Make only these scenes, and leave the files of the whole dataset to [`crate::build::finish`]; all scenes where
+    /// empty.
     pub scenes: Vec<SceneId>,
     /// Replace what exists: the scenes that are named, or the whole dataset where none is.
     pub force: bool,

@@ -123,9 +123,9 @@ impl SourceLight {
 /// The light that the base has to add to that of the facets, so that both are `light`, where the facets alone reflect
 /// `excess` more than the source's coat.
 ///
-/// A surface of the scored model is never darker than its facets, which reflect 2 % at roughness 1. Below twice the excess a
-/// parabola, which continues the line with its slope, keeps dark colours distinct; the result is brighter than the source
-/// by at most the excess, at black.
+/// A surface of the scored model is never darker than its facets, which reflect 2 % at roughness 1. Below twice the
+/// excess a parabola, which continues the line with its slope, keeps dark colours distinct; the result is brighter than
+/// the source by at most the excess, at black.
 fn rise_above(light: f64, excess: f64) -> f64 {
     if light >= 2.0 * excess { light - excess } else { light * light / (4.0 * excess) }
 }

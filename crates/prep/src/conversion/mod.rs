@@ -293,8 +293,8 @@ mod tests {
         scored_model(ColorInput::Constant(color), numbers[0], numbers[1])
     }
 
-    /// Within a thousandth, over colour, width, index of refraction and both kinds of internal scattering. The twin, the base
-    /// colour without the rule, is off by up to a quarter.
+    /// Within a thousandth, over colour, width, index of refraction and both kinds of internal scattering. The twin,
+    /// the base colour without the rule, is off by up to a quarter.
     #[test]
     fn plastic_keeps_its_energy() {
         let mut worst_of_twin = 0.0_f64;
@@ -353,8 +353,9 @@ mod tests {
         assert!(off(&source, &unconverted([0.2; 3], 1.0, 0.0)) > 0.015);
     }
 
-    /// Coloured metals of all widths are exact. The twin, F0 as the base colour, is 2 % too bright for smooth chromium, since
-    /// Schlick's curve rises where the metal's falls, and much more for a rough one, whose facets Mitsuba lets lose light.
+    /// Coloured metals of all widths are exact. The twin, F0 as the base colour, is 2 % too bright for smooth chromium,
+    /// since Schlick's curve rises where the metal's falls, and much more for a rough one, whose facets Mitsuba lets
+    /// lose light.
     #[test]
     fn conductors_keep_their_energy() {
         let copper = ConductorIor::EtaK { eta: [0.2004, 0.9240, 1.1022], k: [3.9129, 2.4528, 2.1421] };
@@ -373,8 +374,9 @@ mod tests {
         assert!(twin(0.0) > 0.02 && twin(0.3) > 0.08, "{} {}", twin(0.0), twin(0.3));
     }
 
-    /// Mitsuba 3.9.1's own materials in uniform light (65,536 samples of each `bsdf.sample`, by a script of its Python package):
-    /// a smooth and a rough plastic of index 1.5, smooth and rough chromium. The converted materials reflect the same.
+    /// Mitsuba 3.9.1's own materials in uniform light (65,536 samples of each `bsdf.sample`, by a script of its Python
+    /// package): a smooth and a rough plastic of index 1.5, smooth and rough chromium. The converted materials reflect
+    /// the same.
     #[test]
     fn converted_materials_reflect_what_mitsubas_do() {
         let base = ColorInput::Constant([0.2, 0.5, 0.8]);
@@ -430,8 +432,8 @@ mod tests {
         ScalarInput::Texture { texture: TextureIndex(texture), channel, uv: UvTransform::default() }
     }
 
-    /// Each texel of a textured plastic is converted as a constant of its colour; wrapping, uv, opacity, glass, lights and the
-    /// name of the file stay; bumps and one-sidedness go. The source's materials are kept as they were.
+    /// Each texel of a textured plastic is converted as a constant of its colour; wrapping, uv, opacity, glass, lights
+    /// and the name of the file stay; bumps and one-sidedness go. The source's materials are kept as they were.
     #[test]
     fn a_scene_with_textures() {
         let bytes = [[10, 200, 90], [255, 0, 30], [128, 64, 1], [77, 78, 79]];

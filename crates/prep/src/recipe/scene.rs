@@ -134,8 +134,8 @@ impl RecipeScene {
         }
     }
 
-    /// The folder that the paths of the scene's files are relative to: the folder of the XML, glTF or .blend file, or else `source`,
-    /// the folder that the recipe's paths are relative to.
+    /// The folder that the paths of the scene's files are relative to: the folder of the XML, glTF or .blend file, or
+    /// else `source`, the folder that the recipe's paths are relative to.
     pub fn root(&self, source: &Path) -> PathBuf {
         match self.main_file() {
             Some(file) => source.join(file).parent().map(Path::to_owned).unwrap_or_default(),

@@ -1,11 +1,12 @@
 //! The RGB ground truth: every view of every scene without a photo, rendered in two independent halves.
 //!
-//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the photo renderer's name in `dataset.json`,
-//! its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes, `finish` writes them).
+//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the photo renderer's name in
+//! `dataset.json`, its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes,
+//! `finish` writes them).
 //!
-//! `run` holds what all renderers share. MatEval's own path tracer renders here, `blender` has Blender render. A new renderer
-//! is a file beside `blender.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in the command line's
-//! `prep render`.
+//! `run` holds what all renderers share. MatEval's own path tracer renders here, `blender` has Blender render. A new
+//! renderer is a file beside `blender.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in the
+//! command line's `prep render`.
 
 mod blender;
 pub(crate) mod run;

@@ -1,15 +1,15 @@
 //! Measures how far pieces of furniture stand in each other, by their meshes and not by their bounding boxes.
 //!
 //! The depth of a pair is the shortest way that one piece must be moved for the two to be apart, over eight horizontal
-//! directions, up and down. Points on each surface are moved along the direction, and the stretches of their ways that the
-//! other piece encloses are where the pieces intersect. The share is the part of the smaller piece's volume that lies in the
-//! other. A chair pushed under a table shares no place with it; a back that the tabletop's edge cuts into is apart after a
-//! few centimetres; a chair that stands in a wardrobe, hollow or not, only after a step.
+//! directions, up and down. Points on each surface are moved along the direction, and the stretches of their ways that
+//! the other piece encloses are where the pieces intersect. The share is the part of the smaller piece's volume that
+//! lies in the other. A chair pushed under a table shares no place with it; a back that the tabletop's edge cuts into
+//! is apart after a few centimetres; a chair that stands in a wardrobe, hollow or not, only after a step.
 //!
-//! Furniture is often open (a sofa without a bottom, a cabinet without a back) or made of parts that overlap, so no single
-//! ray decides. A place is enclosed where at least eleven of fourteen rays from it cross the surface an odd number of times.
-//! A body that lacks a face therefore still encloses what is well inside it; a sheet, such as a tabletop without
-//! thickness, a bowl or a shelf's compartment between boards, encloses nothing.
+//! Furniture is often open (a sofa without a bottom, a cabinet without a back) or made of parts that overlap, so no
+//! single ray decides. A place is enclosed where at least eleven of fourteen rays from it cross the surface an odd
+//! number of times. A body that lacks a face therefore still encloses what is well inside it; a sheet, such as a
+//! tabletop without thickness, a bowl or a shelf's compartment between boards, encloses nothing.
 
 use std::cell::RefCell;
 use std::sync::OnceLock;
@@ -311,7 +311,8 @@ mod tests {
         blocks(&corners)
     }
 
-    /// A chair of 45 by 45 cm that faces -Z: a seat at 45 cm, four legs, and a back that is 90 cm high, at z from 0.19 to 0.22.
+    /// A chair of 45 by 45 cm that faces -Z: a seat at 45 cm, four legs, and a back that is 90 cm high, at z from 0.19
+    /// to 0.22.
     fn chair() -> TriangleMesh {
         let mut corners = vec![[[-0.22, 0.42, -0.22], [0.22, 0.46, 0.22]], [[-0.22, 0.46, 0.19], [0.22, 0.9, 0.22]]];
         for (x, z) in [(-0.22, -0.22), (0.18, -0.22), (-0.22, 0.18), (0.18, 0.18)] {

@@ -5,9 +5,9 @@
 //! input. Rooms and cameras depend on the houses and the seed alone, whether all houses are searched at once, by a run that
 //! was resumed, or by several processes.
 //!
-//! Between: here the houses are found. `house` searches each of them or takes what an earlier run has found there: [`rules`]
-//! state what a room must be like, [`intersect`] measures furniture that stands in other furniture, `candidates` places
-//! cameras and looks through them. [`selection`] chooses scenes, and `output` writes the survey.
+//! Between: here the houses are found. `house` searches each of them or takes what an earlier run has found there:
+//! [`rules`] state what a room must be like, [`intersect`] measures furniture that stands in other furniture,
+//! `candidates` places cameras and looks through them. [`selection`] chooses scenes, and `output` writes the survey.
 
 mod candidates;
 mod house;
@@ -44,9 +44,9 @@ pub struct Surveyed {
     pub kept: usize,
 }
 
-/// Searches the houses and, unless only some of them were to be searched, writes the survey, its page and its recipe. Houses
-/// that an earlier run has searched with the same settings and files are kept. A house that cannot be read is recorded in
-/// the survey and does not stop it.
+/// Searches the houses and, unless only some of them were to be searched, writes the survey, its page and its recipe.
+/// Houses that an earlier run has searched with the same settings and files are kept. A house that cannot be read is
+/// recorded in the survey and does not stop it.
 pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<Surveyed, PrepError> {
     check_folders(options)?;
     let source = source_folder(options)?;

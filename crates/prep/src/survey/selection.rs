@@ -1,10 +1,10 @@
 //! Chooses scenes among the accepted rooms, so that together they are like the paper's.
 //!
 //! Rooms are ranked by the score of their best camera. Then one room after another is chosen: each time the one that
-//! brings the chosen scenes nearest to the goal, of equally near ones the one with the better rank. How far they are from it
-//! is the sum of three terms: the squares of the relative errors of the mean numbers of objects and of super-categories,
-//! and for every room type the square of the difference between its share and an equal share. A house gives a limited
-//! number of scenes.
+//! brings the chosen scenes nearest to the goal, of equally near ones the one with the better rank. How far they are
+//! from it is the sum of three terms: the squares of the relative errors of the mean numbers of objects and of
+//! super-categories, and for every room type the square of the difference between its share and an equal share. A house
+//! gives a limited number of scenes.
 
 use std::collections::BTreeMap;
 
