@@ -1,4 +1,4 @@
-//! The error of this crate.
+//! The error of this crate, whose recipes and scenes have faults of their own.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use mateval_scene::ids::quoted;
 use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{SceneId, ViewId};
 
-use crate::build_scene::fault::SceneFault;
+use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
 
 /// Why a dataset, its renders or a survey could not be made.
@@ -17,23 +17,22 @@ pub enum PrepError {
     Io {
         /// What was tried, as in "read" or "write".
         action: &'static str,
-        /// The file.
         path: PathBuf,
-        /// The system's reason.
         source: std::io::Error,
+    },
+    /// A file or folder is not what the command needs, or must not be replaced.
+    #[error("'{}' {why}", path.display())]
+    Unusable {
+        path: PathBuf,
+        /// The rest of the message: what is wrong, and what to do.
+        why: &'static str,
     },
     /// The recipe is not valid, or its sources are missing; all faults are listed.
     #[error("recipe '{}': {}", path.display(), joined(faults))]
-    Recipe {
-        /// The recipe.
-        path: PathBuf,
-        /// Its faults.
-        faults: Vec<RecipeFault>,
-    },
+    Recipe { path: PathBuf, faults: Vec<RecipeFault> },
     /// A file of a survey's rules that is not valid.
     #[error("rules '{}': {}", path.display(), source.to_string().trim_end())]
     Rules {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it, and where.
         source: Box<toml::de::Error>,
@@ -41,42 +40,26 @@ pub enum PrepError {
     /// A level that a kind of perturbation does not have.
     #[error("{kind} has the levels 0 to {most}, found {found}")]
     NoSuchLevel {
-        /// The kind.
         kind: PerturbationKind,
         /// The level that was asked for.
         found: u32,
-        /// The highest level.
         most: u32,
     },
-    /// A dataset whose geometry is not the true one.
     #[error("the geometry of '{}' is perturbed already; start from the dataset with the true one", path.display())]
-    PerturbedAlready {
-        /// The dataset.
-        path: PathBuf,
-    },
+    PerturbedAlready { path: PathBuf },
     /// A scene without ground truth, from which pictures of its geometry are made.
     #[error(
         "scene '{scene}' has no ground truth, without which its pictures cannot be made again; add its ground_truth/"
     )]
-    NoTruth {
-        /// The scene.
-        scene: SceneId,
-    },
-    /// A dataset in which nothing can be moved.
+    NoTruth { scene: SceneId },
     #[error("no scene of '{}' has furniture; only 3D-FRONT rooms state which objects are furniture", path.display())]
-    NoFurniture {
-        /// The dataset.
-        path: PathBuf,
-    },
-    /// A list of rejected rooms that is not valid.
+    NoFurniture { path: PathBuf },
     #[error("list '{}': {source}", path.display())]
     List {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it, and where.
         source: csv::Error,
     },
-    /// The lists of rejected rooms are too long.
     #[error("list '{}': the lists have more than {most} rows in total", path.display())]
     LongLists {
         /// The file that exceeds the limit.
@@ -84,62 +67,21 @@ pub enum PrepError {
         /// The largest number of rows of all lists together.
         most: usize,
     },
-    /// An input of a survey does not exist.
-    #[error("'{}' does not exist; correct the path, or name its folder with --source", path.display())]
-    MissingInput {
-        /// The file or folder.
-        path: PathBuf,
-    },
-    /// A survey was given no house.
-    #[error("'{}' contains no house; expected JSON files of 3D-FRONT", path.display())]
-    NoHouses {
-        /// The source's folder.
-        path: PathBuf,
-    },
     /// A house that was named alone is none of the survey's.
     #[error(
         "'{name}' is none of the survey's {houses} houses; name one by its file relative to --source, or by the file's name"
     )]
-    UnknownHouse {
-        /// The name.
-        name: String,
-        /// Number of houses.
-        houses: usize,
-    },
-    /// The paths given to a survey lie in no common folder.
-    #[error("'{}' has no folder in common with the other paths; put them into one and name it with --source", path.display())]
-    NoCommonFolder {
-        /// One of the paths.
-        path: PathBuf,
-    },
+    UnknownHouse { name: String, houses: usize },
     /// A path given to a survey does not lie in the source's folder.
     #[error("{0}; a recipe cannot refer to it: name the folder that contains all inputs with --source")]
     OutsideSource(#[from] mateval_sources::below::BelowError),
-    /// The output of a survey exists and is not a survey.
-    #[error("'{}' exists and is not a survey; it is not replaced: choose another --out", path.display())]
-    NotASurvey {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The dataset's build did not finish.
-    #[error(
-        "'{}' lacks MANIFEST.sha256 or dataset.json: its build did not finish; run `prep build` again, or `prep finish` \
-         where all scenes are made",
-        path.display()
-    )]
-    UnfinishedBuild {
-        /// The dataset's folder.
-        path: PathBuf,
-    },
     /// A renderer made a picture of another size than the camera's.
     #[error(
         "scene '{scene}', view '{view}': the rendered picture has {}x{} pixels, expected {}x{}",
         found[0], found[1], expected[0], expected[1]
     )]
     RenderedSize {
-        /// The scene.
         scene: SceneId,
-        /// The view.
         view: ViewId,
         /// Width and height of the camera's picture, in pixels.
         expected: [usize; 2],
@@ -152,7 +94,6 @@ pub enum PrepError {
         path.display(), found[0], found[1], expected[0], expected[1]
     )]
     MapSize {
-        /// The file.
         path: PathBuf,
         /// Width and height of the camera's picture, in pixels.
         expected: [usize; 2],
@@ -162,71 +103,25 @@ pub enum PrepError {
     /// The output folder holds scenes that the recipe would make otherwise, or not at all.
     #[error("'{}' holds a build of another recipe, other source files or another version:{}", path.display(), other_scenes(changed, dropped))]
     OtherBuild {
-        /// The dataset's folder.
         path: PathBuf,
         /// The scenes that were made otherwise.
         changed: Vec<SceneId>,
         /// The scenes that the recipe lacks.
         dropped: Vec<SceneId>,
     },
-    /// Every scene would be left out.
-    #[error("'{}' would have no scene left; leave one --without away", path.display())]
-    NoSceneLeft {
-        /// The dataset's folder.
-        path: PathBuf,
-    },
-    /// A dataset without its `.build` can lose no scenes.
-    #[error("'{}' was not built here, so --without cannot leave scenes out of it", path.display())]
-    NotBuiltHere {
-        /// The dataset's folder.
-        path: PathBuf,
-    },
-    /// Scenes of the recipe are not made.
     #[error(
         "'{}' lacks {} of the recipe: {}; make them by `prep build --scene`, or finish without them by --without",
         path.display(), counted_scenes(scenes), quoted(scenes)
     )]
-    MissingScenes {
-        /// The dataset's folder.
-        path: PathBuf,
-        /// The scenes.
-        scenes: Vec<SceneId>,
-    },
-    /// The folder of scenes holds something else.
+    MissingScenes { path: PathBuf, scenes: Vec<SceneId> },
     #[error(
         "'{}' holds what is no scene of the dataset: '{}'; run `mateval prep finish` if it was built apart, otherwise move \
          it away",
         path.display(), names.join("', '")
     )]
-    StrayScenes {
-        /// The folder.
-        path: PathBuf,
-        /// The names.
-        names: Vec<String>,
-    },
-    /// The output folder holds a finished dataset.
-    #[error(
-        "'{}' holds a finished dataset without the `.build` of its making; --force without --scene replaces it as a whole",
-        path.display()
-    )]
-    FinishedDataset {
-        /// The dataset's folder.
-        path: PathBuf,
-    },
-    /// The output folder exists and is not a dataset.
-    #[error("'{}' exists and is not a dataset; it is not replaced: choose another --out", path.display())]
-    NotADataset {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A scene cannot be made.
+    StrayScenes { path: PathBuf, names: Vec<String> },
     #[error("scene '{scene}': {fault}")]
-    Scene {
-        /// Its id.
-        scene: SceneId,
-        /// The reason.
-        fault: Box<SceneFault>,
-    },
+    Scene { scene: SceneId, fault: Box<SceneFault> },
     /// The source could not be read at all.
     #[error(transparent)]
     Source(#[from] mateval_sources::SourceError),
@@ -246,6 +141,10 @@ impl PrepError {
     pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { action, path, source }
+    }
+    /// A [`PrepError::Unusable`].
+    pub(crate) fn unusable(path: impl Into<PathBuf>, why: &'static str) -> Self {
+        Self::Unusable { path: path.into(), why }
     }
     /// A [`PrepError::Scene`]; to be used with `map_err`.
     pub(crate) fn scene<E: Into<SceneFault>>(scene: &SceneId) -> impl FnOnce(E) -> Self {

@@ -3,28 +3,18 @@
 //! The inputs are a recipe and the folders that it names, which hold files of the sources that [`mateval_sources`] reads.
 //! The output is a dataset's folder as `dataset_spec/FORMAT.md` describes it.
 //!
-//! The steps: [`recipe`] reads and checks the whole recipe. [`build`] then makes scene by scene with [`build_scene`]:
-//! [`mateval_sources`] reads the source, [`instances`] numbers its surfaces, [`part_split`] and [`part_labels`] split them
-//! into parts, [`atlas`] unwraps them, [`bake`] fills their textures, and [`views`] makes the pictures. [`render`] adds the
-//! RGB truth. [`survey`] lists the rooms that a recipe could name. [`perturb`] copies what methods see, with other
-//! geometry.
+//! The steps: [`recipe`] reads and checks the whole recipe. [`build`] then makes scene by scene: it reads the source by
+//! [`mateval_sources`], numbers instances and parts, makes the pictures of the [`views`], unwraps the instances by
+//! [`atlas`] and bakes their materials, which [`conversion`] brings to the scored model. [`render`] adds the RGB truth,
+//! with [`blender`] where that is the renderer. [`scene_meshes`] compares a finished scene with its meshes. [`survey`]
+//! lists the rooms that a recipe could name. [`perturb`] copies what methods see, with other geometry.
 
 pub mod atlas;
-pub mod bake;
 pub mod blender;
-pub mod bring_up_to_date;
 pub mod build;
-pub mod build_scene;
 pub mod conversion;
 pub mod error;
-pub mod faults;
-pub mod finish;
-pub mod instances;
-pub mod numbering;
-pub mod part_labels;
-pub mod part_split;
 pub mod perturb;
-mod preview;
 pub mod recipe;
 pub mod render;
 pub mod scene_meshes;
@@ -32,3 +22,17 @@ pub mod survey;
 pub mod views;
 
 pub use error::PrepError;
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod bring_up_to_date {
+    pub use crate::build::finish::bring_up_to_date;
+}
+#[doc(hidden)]
+pub mod faults {
+    pub use crate::scene_meshes::Faults;
+}
+#[doc(hidden)]
+pub mod finish {
+    pub use crate::build::finish::{finish, finish_again};
+}

@@ -1,13 +1,19 @@
 //! Makes the pictures of one view from one camera matrix: geometry for methods, and material truth for the scorer.
 
+use std::path::Path;
+
 use glam::DVec2;
-use mateval_image::{LinearRgb, Mask, Normal, Picture};
-use mateval_scene::Camera;
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::{LinearRgb, Mask, Normal, Picture, png_io};
+use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::material::Appearance;
 use mateval_scene::reference::{Emission, ReferenceScene, SurfaceIndex};
+use mateval_scene::{Camera, ViewId};
 use mateval_tracer::World;
 use mateval_tracer::aov::{PixelHit, PixelMean, appearance, flatness_values, hit_through, is_veiled, subpixel};
 use rayon::prelude::*;
+
+use crate::error::PrepError;
 
 /// Surfaces of a lower roughness count as specular.
 const SPECULAR_ROUGHNESS: f32 = 0.2;
@@ -19,7 +25,6 @@ pub struct ViewScene<'a> {
     world: &'a World,
     /// The value in `instance.png` of every surface.
     instances: &'a [u16],
-    /// Whether each surface is scored.
     scored: &'a [bool],
     glow: Vec<Glow>,
 }
@@ -48,10 +53,8 @@ pub struct GeometryPictures {
     pub unobserved: Mask,
 }
 
-/// A triangle of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SeenTriangle {
-    /// Its surface.
     pub surface: SurfaceIndex,
     /// Its index among the surface's triangles.
     pub triangle: usize,
@@ -73,7 +76,6 @@ pub struct TruthPictures {
     pub diffuse_albedo: Picture<LinearRgb>,
     /// Perceptual roughness.
     pub roughness: Picture<f32>,
-    /// Metallic.
     pub metallic: Picture<f32>,
     /// Valid pixels whose centre is metallic or has a roughness below 0.2.
     pub specular_region: Mask,
@@ -82,21 +84,13 @@ pub struct TruthPictures {
 /// One pixel of all pictures, with the names of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewPixel {
-    /// See [`GeometryPictures::depth`].
     pub depth: f32,
-    /// See [`GeometryPictures::normal`].
     pub normal: [f32; 3],
-    /// See [`GeometryPictures::instance`].
     pub instance: u16,
-    /// See [`GeometryPictures::triangle`].
     pub triangle: Option<SeenTriangle>,
-    /// See [`GeometryPictures::valid`].
     pub valid: bool,
-    /// See [`GeometryPictures::unobserved`].
     pub unobserved: bool,
-    /// The means over the pixel.
     pub truth: PixelTruth,
-    /// See [`TruthPictures::specular_region`].
     pub specular: bool,
 }
 
@@ -109,7 +103,6 @@ pub struct PixelTruth {
     pub diffuse_albedo: [f32; 3],
     /// Perceptual roughness.
     pub roughness: f32,
-    /// Metallic.
     pub metallic: f32,
 }
 
@@ -119,8 +112,8 @@ impl<'a> ViewScene<'a> {
         Self { world, instances, scored, glow: glow_of_surfaces(reference) }
     }
 
-    /// The pictures that `camera` sees. Pixels whose surface point `input` does not show are unobserved; the input view itself
-    /// has none.
+    /// The pictures that `camera` sees. Pixels whose surface point `input` does not show are unobserved; the input view
+    /// itself has none.
     pub fn pictures(&self, camera: &Camera, input: &Camera) -> (GeometryPictures, TruthPictures) {
         let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
         let pixels: Vec<ViewPixel> = (0..height)
@@ -240,6 +233,59 @@ fn glow_of_surfaces(reference: &ReferenceScene) -> Vec<Glow> {
     glow
 }
 
+/// Writes `rgb.png` in `folder`: linear radiance times exposure, clipped to 0..1, sRGB.
+pub(crate) fn write_preview(folder: &Path, radiance: &Picture<LinearRgb>, exposure: f64) -> Result<(), PrepError> {
+    let exposed = radiance.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
+    Ok(png_io::write_srgb(&folder.join("rgb.png"), &exposed.to_srgb())?)
+}
+
+/// Lowers the nearest depth of every instance that the view shows.
+pub(crate) fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
+    for (instance, depth) in geometry.instance.pixels().iter().zip(geometry.depth.pixels()) {
+        if let Some(place) = usize::from(*instance).checked_sub(1) {
+            let depth = f64::from(*depth);
+            nearest[place] = Some(nearest[place].map_or(depth, |other: f64| other.min(depth)));
+        }
+    }
+}
+
+/// The share of the valid pixels that the input view does not show.
+pub(crate) fn unseen_share(geometry: &GeometryPictures) -> f64 {
+    let count = |mask: &Mask| mask.pixels().iter().filter(|&&holds| holds).count() as f64;
+    // No valid pixel, none unseen.
+    count(&geometry.unobserved) / count(&geometry.valid).max(1.0)
+}
+
+/// Writes the pictures of geometry that methods see, except those of parts.
+pub(crate) fn write_geometry(
+    folder: &SceneFolder,
+    view: &ViewId,
+    geometry: &GeometryPictures,
+) -> Result<(), PrepError> {
+    let shown = folder.view(view);
+    exr_io::write_scalar(&shown.join("depth.exr"), &geometry.depth, Precision::Float)?;
+    exr_io::write_normal(&shown.join("normal.exr"), &geometry.normal, Precision::Half)?;
+    png_io::write_ids(&shown.join("instance.png"), &geometry.instance)?;
+    png_io::write_mask(&shown.join("valid.png"), &geometry.valid)?;
+    if view.as_str() != INPUT {
+        png_io::write_mask(&shown.join("unobserved.png"), &geometry.unobserved)?;
+    }
+    Ok(())
+}
+
+/// Writes the picture of each set of parts. `parts` holds the name of its file and its value for every triangle.
+pub(crate) fn write_parts(
+    shown: &Path,
+    geometry: &GeometryPictures,
+    parts: &[(String, Vec<Vec<u16>>)],
+) -> Result<(), PrepError> {
+    for (file, values) in parts {
+        let picture = geometry.triangle.map(|seen| SeenTriangle::value_in(seen, values));
+        png_io::write_ids(&shown.join(file), &picture)?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use mateval_scene::TriangleMesh;
@@ -248,7 +294,8 @@ mod tests {
 
     use super::*;
 
-    /// A lamp with a map emits on the same sides as one without; a lamp without radiance, or hidden from the camera, on none.
+    /// A lamp with a map emits on the same sides as one without; a lamp without radiance, or hidden from the camera, on
+    /// none.
     #[test]
     fn maps_do_not_change_the_sides_that_emit() {
         let glow = |radiance: f32, mapped: bool, two_sided: bool, camera_visible: bool| {

@@ -1,21 +1,22 @@
 //! `release.json`: everything that the report of a release states, for programs.
+//!
+//! Here are also the facts about a publication that its files do not hold, with the citation, and what must not become
+//! public while the ground truth is withheld: everything that was measured on it in single scenes, and every sentence that
+//! may quote it. What remains of it are means over scenes, as a leaderboard shows them too, the counts of checks, and the
+//! settings of the renderer.
 
 use std::collections::BTreeSet;
+use std::str::FromStr;
 
 use mateval_audit::stats::StatsFile;
+use mateval_scene::dataset::DatasetFile;
 use mateval_scene::scene_cost::StepCost;
 use mateval_scene::{Finding, RendererId, SceneId, Severity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::comparisons::SceneVerdict;
-use crate::inputs::{SceneInputs, SharedLicence};
-use crate::publication::Publication;
-use crate::reference_scores::ReferenceScores;
-use crate::remake::Remake;
-use crate::table_one::Evaluated;
-use crate::thumbnails::Thumbnail;
-use crate::truth_renders::{RenderedWith, ViewNoise};
+use crate::gathered::{Evaluated, Remake, RenderedWith, SceneInputs, SharedLicence, Thumbnail, ViewNoise};
+use crate::given::{ReferenceScores, SceneVerdict};
 
 /// The format of this version of the file.
 pub const RELEASE_FORMAT: &str = "mateval-release/1";
@@ -124,7 +125,6 @@ impl ReleaseFile {
         self.verification.sound && self.comparisons().all(|verdict| verdict.agrees)
     }
 
-    /// The comparisons that were given.
     pub fn comparisons(&self) -> impl Iterator<Item = &SceneVerdict> {
         self.scenes.iter().filter_map(|scene| scene.comparison.as_ref())
     }
@@ -149,4 +149,178 @@ impl ReleaseFile {
 /// The folder in `scenes` that the finding is about.
 fn scene_of(finding: &Finding) -> Option<&str> {
     finding.file.strip_prefix("scenes/")?.split('/').next()
+}
+
+/// Facts that the dataset does not hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Publication {
+    /// The day of publication.
+    pub date: Option<Day>,
+    /// Where the dataset is published.
+    pub url: Option<String>,
+    /// The authors, separated by ` and ` as in BibTeX.
+    pub authors: Option<String>,
+}
+
+/// A day, as in `2026-11-24`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "String", into = "String")]
+pub struct Day(String);
+
+/// A text that is not a day.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{}' is not a day; expected one as in 2026-11-24", mateval_scene::findings::shortened(.0))]
+pub struct BadDay(String);
+
+impl FromStr for Day {
+    type Err = BadDay;
+
+    fn from_str(text: &str) -> Result<Self, BadDay> {
+        let parts: Vec<&str> = text.split('-').collect();
+        let is_number = |part: &str, digits: usize| part.len() == digits && part.bytes().all(|b| b.is_ascii_digit());
+        let within = |part: &str, most: u32| part.parse::<u32>().is_ok_and(|number| (1..=most).contains(&number));
+        match parts[..] {
+            [year, month, day]
+                if is_number(year, 4)
+                    && is_number(month, 2)
+                    && is_number(day, 2)
+                    && within(month, 12)
+                    && within(day, 31) =>
+            {
+                Ok(Self(text.to_owned()))
+            }
+            _ => Err(BadDay(text.to_owned())),
+        }
+    }
+}
+
+impl TryFrom<String> for Day {
+    type Error = BadDay;
+
+    fn try_from(text: String) -> Result<Self, BadDay> {
+        text.parse()
+    }
+}
+
+impl From<Day> for String {
+    fn from(day: Day) -> Self {
+        day.0
+    }
+}
+
+impl Day {
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// An entry for BibTeX. It names the manifest, so that the citation fixes every byte of the dataset.
+pub fn bibtex(dataset: &DatasetFile, publication: &Publication) -> String {
+    let manifest = &dataset.manifest_sha256;
+    let date = publication.date.as_ref().map(Day::as_str);
+    let title = format!("{}, version {}", escaped(&dataset.name), escaped(&dataset.version));
+    let fields = [
+        ("author", publication.authors.as_deref().map(escaped)),
+        ("title", Some(format!("{{{title}}}"))),
+        ("year", date.map(|date| date[..4].to_owned())),
+        ("date", date.map(str::to_owned)),
+        ("url", publication.url.clone().map(|url| url.replace(['{', '}', '\\'], ""))),
+        ("note", Some(format!("Dataset, SHA-256 of its manifest: {manifest}"))),
+    ];
+    let lines = fields.into_iter().filter_map(|(name, value)| Some(format!("  {name:<6} = {{{}}},\n", value?)));
+    format!("@misc{{{},\n{}}}\n", key(dataset), lines.collect::<String>())
+}
+
+/// The entry's key: the name and the beginning of the hash.
+fn key(dataset: &DatasetFile) -> String {
+    let name: String = dataset.name.chars().filter(char::is_ascii_alphanumeric).take(40).collect();
+    let hash: String = dataset.manifest_sha256.chars().take(8).collect();
+    format!("{}-{hash}", if name.is_empty() { "dataset" } else { &name })
+}
+
+/// The text in one line, with the characters escaped that TeX interprets.
+fn escaped(text: &str) -> String {
+    let one = |c: char| match c {
+        '#' | '$' | '%' | '&' | '_' => format!("\\{c}"),
+        '{' | '}' => String::new(),
+        '\\' => "\\textbackslash ".to_owned(),
+        '~' => "\\textasciitilde ".to_owned(),
+        '^' => "\\textasciicircum ".to_owned(),
+        c if c.is_control() => " ".to_owned(),
+        c => c.to_string(),
+    };
+    text.chars().map(one).collect()
+}
+
+/// In place of sentences that may quote the ground truth.
+pub(crate) const NOT_SHOWN: &str = "not shown, since the ground truth is withheld";
+
+/// Removes from a report what must not become public while the ground truth is withheld.
+pub(crate) fn withhold(file: &mut ReleaseFile, commitment_sha256: String) {
+    file.withheld = Some(Withheld { commitment_sha256 });
+    file.verification.findings.iter_mut().for_each(silence);
+    [&mut file.ceiling, &mut file.floor].into_iter().flatten().for_each(only_means);
+    for scene in &mut file.scenes {
+        scene.noise = None;
+        if let Some(verdict) = &mut scene.comparison {
+            verdict.faults = None;
+        }
+    }
+}
+
+/// Keeps the kind of a finding and its file. Any message of the verification may quote a pixel.
+fn silence(finding: &mut Finding) {
+    finding.place.clear();
+    finding.message = NOT_SHOWN.to_owned();
+    finding.action = "run `mateval prep verify` on the whole dataset".to_owned();
+}
+
+/// Keeps means over two scenes or more: the mean over one scene is that scene's score.
+fn only_means(scores: &mut ReferenceScores) {
+    if let Some(scenes) = scores.scenes.take() {
+        scores.summary.retain(|key, _| scenes.values().filter(|values| values.contains_key(key)).count() >= 2);
+    }
+    if scores.scenes_scored < 2 {
+        scores.summary.clear();
+    }
+    scores.summary_noise.retain(|key, _| scores.summary.contains_key(key));
+    scores.noise = None;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dataset(name: &str) -> DatasetFile {
+        let text = serde_json::json!({
+            "format": "mateval/3", "name": name, "version": "1.0", "tool": "mateval 0", "scenes": [],
+            "photo_renderer": null, "licences": [], "manifest_sha256": "0123456789abcdef",
+        });
+        serde_json::from_value(text).unwrap()
+    }
+
+    #[test]
+    fn days() {
+        assert_eq!("2026-11-24".parse::<Day>().unwrap().as_str(), "2026-11-24");
+        for bad in ["", "2026", "2026-13-01", "2026-1-1", "2026-01-00", "+026-01-01", "2026-01-01-01", "<b>"] {
+            assert!(bad.parse::<Day>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn the_entry_names_the_manifest_and_stays_one() {
+        let publication = Publication {
+            date: "2026-11-24".parse().ok(),
+            url: Some("https://example.org/a_b".to_owned()),
+            authors: Some("A. Author and B. Author".to_owned()),
+        };
+        let entry = bibtex(&dataset("rooms_1}, author={x"), &publication);
+        assert!(entry.starts_with("@misc{rooms1authorx-01234567,\n  author = {A. Author and B. Author},\n"), "{entry}");
+        assert!(entry.contains("  title  = {{rooms\\_1, author=x, version 1.0}},\n"), "{entry}");
+        assert!(entry.contains("0123456789abcdef") && entry.contains("  year   = {2026},\n"), "{entry}");
+        let bare = bibtex(&dataset("♥"), &Publication::default());
+        assert!(bare.starts_with("@misc{dataset-01234567,\n  title"), "{bare}");
+        assert!(!bare.contains("year"), "{bare}");
+    }
 }

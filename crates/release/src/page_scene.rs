@@ -8,9 +8,8 @@ use mateval_scene::scene_cost::{Step, StepCost};
 use mateval_scene::{Finding, Severity};
 use serde::Serialize;
 
-use crate::comparisons::{SceneVerdict, StateCount};
 use crate::file::{ReleaseFile, ReleasedScene};
-use crate::reference_scores::ReferenceScores;
+use crate::given::{ReferenceScores, SceneVerdict, StateCount};
 
 /// The scores of the table's columns.
 pub(crate) const SHOWN_SCORES: [(&str, ResultKey); 2] = [
@@ -20,7 +19,7 @@ pub(crate) const SHOWN_SCORES: [(&str, ResultKey); 2] = [
 
 /// A cell: what the column is sorted by, and its text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Cell {
+struct Cell {
     pub(crate) value: Option<f64>,
     pub(crate) text: String,
 }
@@ -220,7 +219,7 @@ fn findings(scene: &ReleasedScene) -> Cell {
 }
 
 fn views(scene: &ReleasedScene) -> Vec<[String; 3]> {
-    let row = |view: &crate::truth_renders::ViewNoise| {
+    let row = |view: &crate::gathered::ViewNoise| {
         let psnr = view.mean_of_halves_psnr_db.map_or_else(|| "no noise".to_owned(), |db| format!("{db:.2} dB"));
         [view.view.to_string(), psnr, format!("{:.2e}", view.denoised_mse)]
     };

@@ -12,12 +12,10 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::bounded_cache::{keep_below, mark_used};
 use mateval_scene::manifest::sha256_of_bytes;
 
-use super::layout::AtlasLayout;
-use super::packing::{AtlasError, SizeWish};
+use super::packing::{AtlasError, AtlasLayout, SizeWish};
 
 /// What makes layouts. A cache never holds what another version made.
-const MAKERS: [&str; 4] =
-    ["uvunwrap 0.2.0", include_str!("layout.rs"), include_str!("mod.rs"), include_str!("packing.rs")];
+const MAKERS: [&str; 2] = ["uvunwrap 0.2.0", include_str!("packing.rs")];
 /// Size of the largest file that is read, in bytes.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 /// The largest size of a cache, in bytes.
@@ -26,7 +24,7 @@ const MOST_BYTES: u64 = 4 << 30;
 const HASH_DIGITS: usize = 64;
 
 /// A layout, or why there is none.
-pub(super) type Made = Result<AtlasLayout, AtlasError>;
+type Made = Result<AtlasLayout, AtlasError>;
 
 /// The shape of a mesh as a key: SHA-256, hex, of its vertices and triangles.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -122,9 +120,8 @@ fn parse(bytes: &[u8]) -> Option<Made> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::packing::packed;
     use super::super::tests::cuboid;
-    use super::super::{Wanted, unwrap_copies};
+    use super::super::{Wanted, packed, unwrap_copies};
     use super::*;
 
     fn files(folder: &Path) -> Vec<PathBuf> {

@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use mateval_scene::{Finding, Severity, json};
 use serde::{Deserialize, Serialize};
 
-use super::process::{BlenderLimits, BlenderProgram, Ended, run, tail};
-use super::scripts;
-use crate::build_scene::fault::BakeFault;
+use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
+use crate::build::fault::BakeFault;
 use crate::error::PrepError;
 
 const JOB_FORMAT: &str = "mateval-bake/1";
@@ -51,15 +50,12 @@ pub struct Baked {
     pub world: Option<BakedWorld>,
     /// Area lamps, which are emitting rectangles in the GLB.
     pub lamps: Vec<BakedLamp>,
-    /// The materials of the GLB.
     pub materials: Vec<BakedMaterial>,
     /// Files that the scene needs besides its own, relative to its folder.
     pub files: Vec<String>,
     /// What was left out, replaced or approximated.
     pub findings: Vec<BakedFinding>,
-    /// Why the file is refused.
     pub faults: Vec<BakedFinding>,
-    /// Why baking failed.
     pub error: Option<String>,
 }
 
@@ -87,7 +83,6 @@ pub enum BakedWorld {
 pub struct BakedLamp {
     /// The name of its node.
     pub node: String,
-    /// Whether the camera sees it.
     pub visible: bool,
 }
 
@@ -104,7 +99,6 @@ pub struct BakedMaterial {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BakedFinding {
-    /// Its code.
     pub code: String,
     /// The object or material.
     pub place: String,
@@ -135,7 +129,7 @@ pub fn bake(
     let absolute = |path: &Path| std::path::absolute(path).map_err(PrepError::io("resolve", path));
     let (blend, out) = (absolute(blend)?, absolute(out)?);
     std::fs::create_dir_all(&out).map_err(PrepError::io("make", &out))?;
-    let script = scripts::write(&out)?.with_file_name(scripts::BAKE);
+    let script = write_scripts(&out)?.with_file_name(BAKE_SCRIPT);
     let file = blend.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let job = Job {
         format: JOB_FORMAT,

@@ -1,33 +1,51 @@
 //! Makes the dataset of a recipe scene by scene, each completely or not at all. A run that was killed is resumed.
+//!
+//! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source` reads
+//! the source with its photo and chooses the input camera; `plan` numbers instances and parts ([`parts`]), converts the
+//! materials and places the views; `pictures` writes what each view shows and refuses scenes that would become a wrong
+//! truth; [`materials`] unwraps every instance and bakes its material; meshes and `scene.json` are written here. [`finish`]
+//! writes the files of the whole dataset. [`fault`] lists why a scene is refused.
 
-mod options;
-pub(crate) mod scene_mark;
-mod source_check;
+pub mod fault;
+pub mod finish;
+pub mod materials;
+pub mod parts;
+mod pictures;
+mod plan;
+mod source;
 pub(crate) mod start;
 
 use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::dataset::{Licence, SceneFile};
+use mateval_scene::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SceneSource, SourceFile};
+use mateval_scene::glb::{self, GlbNode};
 use mateval_scene::layout::SceneFolder;
+use mateval_scene::material_class::MaterialClassesFile;
+use mateval_scene::reference::Surface;
 use mateval_scene::scene_cost::{self, Step, TimedStep};
 use mateval_scene::scene_hashes::SceneHashes;
 use mateval_scene::work_folder::{WorkFolder, remove, remove_beside};
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, json};
+use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference_io};
+use mateval_sources::source_scene::LicenceText;
 
 use crate::atlas::cache::AtlasCache;
-use crate::build_scene::{self, Built};
 use crate::error::PrepError;
-use crate::finish::finish_build;
 use crate::recipe::{self, Recipe, RecipeScene};
-pub use options::BuildOptions;
-use scene_mark::{SceneMark, finished_scene, label_files, settings_sha256};
-use source_check::{check_sources, make_relative, source_folder};
+use crate::render::BlenderOptions;
+use fault::{PinFault, SceneFault, above_notes};
+use finish::finish_build;
+use materials::{AtlasSizes, InstanceAtlas, write_materials};
+use pictures::{check_missing, check_unstated, is_lit, write_pictures};
+use plan::{Plan, make_plan};
+use source::{Baking, read_source};
+pub use start::BuildOptions;
+use start::{
+    SceneMark, begin, check_sources, finished_scene, label_files, make_relative, settings_sha256, source_folder,
+};
 
-/// The result of a build.
 #[derive(Clone, Debug, Default)]
 pub struct BuildReport {
-    /// The findings of every scene.
     pub findings: Vec<(SceneId, Vec<Finding>)>,
     /// Scenes that an earlier run had already made.
     pub resumed: Vec<SceneId>,
@@ -42,7 +60,7 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
     make_relative(options, &mut recipe, &source)?;
     let scenes = chosen(options, &recipe)?;
     check_sources(options, &scenes, &source)?;
-    start::begin(options, &written, &text, tool, &source)?;
+    begin(options, &written, &text, tool, &source)?;
 
     let mut report = BuildReport::default();
     for (at, entry) in scenes.iter().enumerate() {
@@ -101,8 +119,8 @@ fn make_scene(
     let labels = label_files(entry, source);
     let cache = options.atlas_cache.as_deref().map(AtlasCache::new);
     let at = SceneFolder::at(work.path().to_owned());
-    let Built { licence, absent } =
-        build_scene::build(recipe, entry, source, options.blender.as_ref(), &at, cache.as_ref(), progress)?;
+    let (licence, absent) =
+        build_scene(recipe, entry, source, options.blender.as_ref(), &at, cache.as_ref(), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
     let made = SceneMark { settings_sha256, licence, absent, labels };
     work.finish()?;
@@ -112,4 +130,181 @@ fn make_scene(
     let marks = mark.parent().unwrap_or(&mark);
     std::fs::create_dir_all(marks).map_err(PrepError::io("make", marks))?;
     Ok(json::write(&mark, &made)?)
+}
+
+/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases are
+/// taken from the cache where it holds them. Returns what the folder does not hold: the licence that came with the source,
+/// and the files that were looked for but do not exist, with paths as in `scene.json`; sorted.
+fn build_scene(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    source: &Path,
+    blender: Option<&BlenderOptions>,
+    folder: &SceneFolder,
+    cache: Option<&AtlasCache>,
+    progress: Progress<'_>,
+) -> Result<(Option<LicenceText>, Vec<String>), PrepError> {
+    // The source, with numbered instances and parts.
+    progress(Report::step("read the source", 0, 1));
+    let read = read_source(recipe, entry, source, &Baking { blender, folder: folder.path(), progress })?;
+    let licence = read.licence.clone();
+    let missing = check_missing(entry, &read.missing, &entry.root(source), &read.file, &read.findings);
+    let missing = missing.map_err(PrepError::scene(&entry.id))?;
+    let (mut plan, absent) = make_plan(recipe, entry, source, read)?;
+    plan.findings.extend(missing);
+    check_inputs(entry, &plan.files)?;
+    make_folders(folder, &plan)?;
+
+    // Views and atlases. Only instances with an appearance can have an atlas.
+    let has_appearance = |surface: &Surface| plan.scene.materials[surface.material.0].has_appearance();
+    let expected: Vec<bool> = plan.scene.surfaces.iter().map(has_appearance).collect();
+    let mut seen = write_pictures(&plan, folder, &expected, progress)?.or_refuse(&entry.id, &plan)?;
+    let unstated = check_unstated(entry, &plan, &seen).map_err(PrepError::scene(&entry.id))?;
+    plan.findings.extend(unstated);
+    if !is_lit(&plan)? {
+        let findings = above_notes(&[plan.findings.as_slice(), &seen.findings].concat());
+        return Err(PrepError::scene(&entry.id)(SceneFault::NoLight { lights: plan.scene.lights.len(), findings }));
+    }
+    let sizes = AtlasSizes { fixed: entry.atlas_size.or(recipe.atlas_size), nearest: &seen.nearest };
+    let atlases = write_materials(&mut plan, folder, &sizes, cache, progress)?;
+    let scored: Vec<bool> = atlases.iter().map(|atlas| atlas.unwrapped.is_some()).collect();
+    if scored != expected {
+        // An instance without an atlas cannot be scored, so its pixels must not be valid.
+        seen = write_pictures(&plan, folder, &scored, progress)?.or_refuse(&entry.id, &plan)?;
+    }
+    plan.findings.extend(seen.findings);
+    if let Some(photo) = &plan.photo {
+        photo.write(folder, &plan.views[0], entry.exposure)?;
+    }
+    for (view, unseen_share) in plan.views.iter_mut().zip(seen.unseen_shares) {
+        view.wide.iter_mut().for_each(|wide| wide.unseen_share = unseen_share);
+    }
+    // The remaining files.
+    write_meshes(&plan, folder, &atlases)?;
+    reference_io::write(folder, &plan.scene)?;
+    if let Some(source) = &plan.source_materials {
+        reference_io::write_source_materials(folder, source)?;
+    }
+    if let Some(parts) = plan.classes.take() {
+        let file = MaterialClassesFile { format: FORMAT.to_owned(), parts };
+        json::write(&folder.material_classes(), &file)?;
+    }
+    write_scene_file(plan, recipe, entry, &atlases, folder)?;
+    Ok((licence, absent))
+}
+
+/// Fails if the recipe pins files and any file that was read or pinned differs.
+fn check_inputs(entry: &RecipeScene, files: &[(String, String)]) -> Result<(), PrepError> {
+    if entry.inputs.is_empty() {
+        return Ok(());
+    }
+    let differs = |(path, sha256): &(String, String)| match entry.inputs.get(path) {
+        Some(pinned) if pinned == sha256 => None,
+        Some(pinned) => Some(PinFault::Changed { file: path.clone(), found: sha256.clone(), pinned: pinned.clone() }),
+        None => Some(PinFault::Unlisted { file: path.clone() }),
+    };
+    let mut faults: Vec<PinFault> = files.iter().filter_map(differs).collect();
+    let read = |path: &String| files.iter().any(|file| file.0 == *path);
+    let unread = entry.inputs.keys().filter(|path| !read(path));
+    faults.extend(unread.map(|path| PinFault::Unread { file: path.clone() }));
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(PrepError::scene(&entry.id)(SceneFault::Pins { faults }))
+}
+
+fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
+    let views = plan.views.iter().flat_map(|view| [folder.view(&view.id), folder.truth_view(&view.id)]);
+    let geometry = folder.path().join("geometry");
+    for path in views.chain([geometry]) {
+        std::fs::create_dir_all(&path).map_err(PrepError::io("make", path))?;
+    }
+    Ok(())
+}
+
+/// Writes `instances.glb` and, for each set of parts, its `parts.glb`.
+fn write_meshes(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) -> Result<(), SceneError> {
+    let meshes: Vec<TriangleMesh> = plan
+        .scene
+        .surfaces
+        .iter()
+        .zip(atlases)
+        .map(|(surface, atlas)| match &atlas.unwrapped {
+            Some(unwrapped) => unwrapped.mesh.clone(),
+            None => TriangleMesh { uvs: None, ..surface.mesh.clone() },
+        })
+        .collect();
+    for split in &plan.part_splits {
+        let parts = split.meshes(&meshes).into_iter().map(|(id, mesh)| GlbNode { name: id.to_string(), mesh });
+        glb::write(&folder.parts(split.id.as_ref()), &parts.collect::<Vec<_>>())?;
+    }
+    let instances: Vec<GlbNode> = plan
+        .instances
+        .iter()
+        .zip(meshes)
+        .map(|(instance, mesh)| GlbNode { name: instance.id.to_string(), mesh })
+        .collect();
+    glb::write(&folder.instances(), &instances)
+}
+
+fn write_scene_file(
+    plan: Plan,
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    atlases: &[InstanceAtlas],
+    folder: &SceneFolder,
+) -> Result<(), PrepError> {
+    let instances = plan.instances.iter().zip(&plan.scene.surfaces).zip(atlases).zip(&plan.stated);
+    let instances = instances
+        .map(|(((instance, surface), atlas), stated)| Instance {
+            id: instance.id.clone(),
+            index: instance.index,
+            name: surface.name.clone(),
+            role: instance.role.clone(),
+            category: instance.category.clone(),
+            super_category: instance.super_category.clone(),
+            triangles: surface.mesh.triangles.len(),
+            unstated: stated.unstated(),
+            atlas: atlas.unwrapped.as_ref().map(|unwrapped| Atlas {
+                size: unwrapped.size,
+                charts: unwrapped.charts,
+                coverage: unwrapped.coverage,
+                texel_m: unwrapped.texel_m,
+                half_pixel_m: atlas.half_pixel_m,
+            }),
+        })
+        .collect();
+    let mut parts = Vec::new();
+    let mut part_sets = Vec::new();
+    for split in &plan.part_splits {
+        match &split.id {
+            None => parts = split.listed(&plan.instances),
+            Some(id) => part_sets.push(PartSet { id: id.clone(), parts: split.listed(&plan.instances) }),
+        }
+    }
+    let files = plan.files.into_iter().map(|(path, sha256)| SourceFile { path, sha256 }).collect();
+    let mut findings = plan.findings;
+    findings.sort();
+    let file = SceneFile {
+        format: FORMAT.to_owned(),
+        id: entry.id.clone(),
+        source: SceneSource {
+            kind: plan.kind,
+            house: plan.house,
+            states_roughness: plan.states_roughness,
+            states_metallic: plan.states_metallic,
+            shift_m: plan.shift_m.to_array(),
+            files,
+        },
+        lights: plan.lights,
+        materials: recipe.materials,
+        exposure: entry.exposure,
+        photo: plan.photo.map(|photo| photo.listed),
+        views: plan.views,
+        instances,
+        parts,
+        part_sets,
+        findings,
+    };
+    Ok(json::write(&folder.scene_file(), &file)?)
 }

@@ -1,17 +1,122 @@
 //! Begins a build in a new folder, or resumes one that was begun there.
+//!
+//! The files that the scenes are made of must exist and be those that the recipe pins. Each scene that is made leaves a
+//! mark, by which a later run finds that it need not make the scene again.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use mateval_scene::build_folder::{BUILD, BuildFolder};
+use mateval_scene::dataset::{Licence, SceneFile, SourceFile};
 use mateval_scene::layout::{DATASET, SceneFolder};
 use mateval_scene::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
-use mateval_scene::{SceneId, json};
+use mateval_scene::{SceneId, json, manifest};
+use mateval_sources::below::relative_below;
 use serde::{Deserialize, Serialize};
 
-use super::options::BuildOptions;
-use super::scene_mark::{SceneMark, finished_scene, settings_sha256};
+use super::parts::file_names;
 use crate::error::PrepError;
-use crate::recipe::Recipe;
+use crate::recipe::fault::{RecipeFault, RecipeSceneFault};
+use crate::recipe::{Recipe, RecipeScene, SourcePath};
+use crate::render::BlenderOptions;
+
+#[derive(Clone, Debug)]
+pub struct BuildOptions {
+    pub recipe: PathBuf,
+    /// The folder that the recipe's paths are relative to; if absent, the recipe's own.
+    pub source: Option<PathBuf>,
+    pub out: PathBuf,
+    /// Make only these scenes, and leave the files of the whole dataset to [`crate::build::finish`]; all scenes where
+    /// empty.
+    pub scenes: Vec<SceneId>,
+    /// Replace what exists: the scenes that are named, or the whole dataset where none is.
+    pub force: bool,
+    /// The Blender that reads `.blend` files; absent if none was found.
+    pub blender: Option<BlenderOptions>,
+    /// The folder of atlases that earlier builds made; none to make all of them.
+    pub atlas_cache: Option<PathBuf>,
+}
+
+/// The folder that the recipe's paths are relative to.
+pub(super) fn source_folder(options: &BuildOptions) -> PathBuf {
+    // The parent of a file name alone is the empty path, which names no folder.
+    let parent = options.recipe.parent().filter(|folder| !folder.as_os_str().is_empty());
+    options.source.clone().unwrap_or_else(|| parent.unwrap_or(Path::new(".")).to_owned())
+}
+
+/// Makes the paths that the dataset records relative to `source`.
+pub(super) fn make_relative(options: &BuildOptions, recipe: &mut Recipe, source: &Path) -> Result<(), PrepError> {
+    let mut faults = Vec::new();
+    for scene in &mut recipe.scenes {
+        let id = scene.id.clone();
+        for (key, path) in scene.recorded_paths() {
+            match relative_below(path, source) {
+                Ok(relative) => *path = relative,
+                Err(source) => faults.push((id.clone(), RecipeSceneFault::OutsideSource { key, source })),
+            }
+        }
+    }
+    refuse_if_any(options, faults)
+}
+
+/// Fails where a scene of the recipe has a fault.
+fn refuse_if_any(options: &BuildOptions, faults: Vec<(SceneId, RecipeSceneFault)>) -> Result<(), PrepError> {
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let faults = faults.into_iter().map(|(scene, fault)| RecipeFault::Scene { scene, fault }).collect();
+    Err(PrepError::Recipe { path: options.recipe.clone(), faults })
+}
+
+/// Fails before the first scene is made if any scene's sources are missing or differ from those that the recipe pins.
+pub(super) fn check_sources(options: &BuildOptions, scenes: &[&RecipeScene], source: &Path) -> Result<(), PrepError> {
+    refuse_if_any(options, faults_of_all(scenes, source, missing_sources))?;
+    refuse_if_any(options, faults_of_all(scenes, source, changed_inputs))
+}
+
+/// The faults that `check` finds in the scenes.
+fn faults_of_all(
+    scenes: &[&RecipeScene],
+    source: &Path,
+    check: fn(&RecipeScene, &Path) -> Vec<RecipeSceneFault>,
+) -> Vec<(SceneId, RecipeSceneFault)> {
+    let mut all = Vec::new();
+    for scene in scenes {
+        all.extend(check(scene, source).into_iter().map(|fault| (scene.id.clone(), fault)));
+    }
+    all
+}
+
+fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> {
+    let root = scene.root(source);
+    let labels = scene.part_labels.values().map(|path| ("part_labels", root.join(path), true));
+    let photo = scene.photo.iter().map(|path| ("photo", root.join(path), false));
+    let paths =
+        scene.source_paths().into_iter().map(|SourcePath { key, path, is_folder }| (key, source.join(path), is_folder));
+    let fault = |(key, path, is_folder): (&'static str, PathBuf, bool)| {
+        let exists = if is_folder { path.is_dir() } else { path.is_file() };
+        let kind = if is_folder { "folder" } else { "file" };
+        (!exists).then_some(RecipeSceneFault::MissingSource { key, kind, path })
+    };
+    paths.chain(labels).chain(photo).filter_map(fault).collect()
+}
+
+/// The pinned inputs that do not exist or have other bytes.
+fn changed_inputs(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> {
+    let root = scene.root(source);
+    let fault = |(file, pinned): (&String, &String)| {
+        let (path, file) = (root.join(file), file.clone());
+        if !path.is_file() {
+            return Some(RecipeSceneFault::MissingInput { file });
+        }
+        match manifest::sha256_of_file(&path) {
+            Ok(found) if found == *pinned => None,
+            Ok(found) => Some(RecipeSceneFault::ChangedInput { file, found, pinned: pinned.clone() }),
+            Err(source) => Some(RecipeSceneFault::UnreadableInput { file, source }),
+        }
+    };
+    scene.inputs.iter().filter_map(fault).collect()
+}
 
 const KEY_FORMAT: &str = "mateval-build/1";
 
@@ -90,11 +195,15 @@ pub(super) fn begin(
 
 /// Fails where the folder must not be written to.
 fn check_place(options: &BuildOptions, place: Place) -> Result<(), PrepError> {
-    let path = || options.out.clone();
     match place {
-        Place::Other => Err(PrepError::NotADataset { path: path() }),
+        Place::Other => Err(PrepError::unusable(
+            &options.out,
+            "exists and is not a dataset; it is not replaced: choose another --out",
+        )),
         Place::Dataset if !options.force || !options.scenes.is_empty() => {
-            Err(PrepError::FinishedDataset { path: path() })
+            let why = "holds a finished dataset without the `.build` of its making; --force \
+                       without --scene replaces it as a whole";
+            Err(PrepError::unusable(&options.out, why))
         }
         _ => Ok(()),
     }
@@ -140,4 +249,84 @@ pub(crate) fn holds_only(folder: &Path, names: &[&str]) -> bool {
     std::fs::read_dir(folder)
         .and_then(|entries| entries.collect::<Result<Vec<_>, _>>())
         .is_ok_and(|entries| entries.iter().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
+}
+
+/// The file that a finished scene leaves in the build folder.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct SceneMark {
+    /// The hash of the recipe's settings for the scene, and of the tool that made it.
+    pub(crate) settings_sha256: String,
+    pub(crate) licence: Option<Licence>,
+    /// Files that were looked for but do not exist, with paths as in `scene.json`.
+    pub(super) absent: Vec<String>,
+    /// All files in the folders of labels, whether used or not.
+    pub(super) labels: BTreeSet<PathBuf>,
+}
+
+/// The mark of a scene that an earlier run made from the same files: none has changed, and none has been added since.
+pub(super) fn finished_scene(root: &Path, entry: &RecipeScene, source: &Path) -> Option<SceneMark> {
+    let mark: SceneMark = json::read(&BuildFolder::of(root).mark(&entry.id)).ok()?;
+    let scene: SceneFile = json::read(&SceneFolder::of(root, &entry.id).scene_file()).ok()?;
+    let root = entry.root(source);
+    let is_same = |file: &SourceFile| manifest::sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
+    let is_absent = |file: &String| !root.join(file).exists();
+    let same = scene.source.files.iter().all(is_same) && mark.absent.iter().all(is_absent);
+    (same && mark.labels == label_files(entry, source)).then_some(mark)
+}
+
+/// The files in the folders of a scene's labels.
+pub(super) fn label_files(entry: &RecipeScene, source: &Path) -> BTreeSet<PathBuf> {
+    let files = |folder: &PathBuf| {
+        // A folder that cannot be listed fails where it is read.
+        let names = file_names(&entry.root(source).join(folder)).unwrap_or_default();
+        names.into_iter().map(|name| folder.join(name)).collect::<Vec<_>>()
+    };
+    entry.part_labels.values().flat_map(files).collect()
+}
+
+/// The hash of everything but files that decides how the scene of this id is made. `recipe` is as written.
+pub(crate) fn settings_sha256(recipe: &Recipe, id: &SceneId, tool: &str) -> String {
+    // Every setting is printed with all its fields; other scenes, the dataset's name and the renderer's samples are not
+    // among them. The text is read by nobody, and the tool's version stands in it.
+    let Recipe {
+        name: _,
+        version: _,
+        resolution,
+        views,
+        wide,
+        atlas_size,
+        materials,
+        camera_rules,
+        samples: _,
+        scenes,
+    } = recipe;
+    let entry = scenes.iter().find(|entry| entry.id == *id);
+    let settings = format!(
+        "{tool}\n{resolution:?}\n{views:?}\n{wide:?}\n{atlas_size:?}\n{materials:?}\n{camera_rules}\n{entry:?}"
+    );
+    manifest::sha256_of_bytes(settings.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipe_without_a_folder_lies_in_the_current_one() {
+        let source = |recipe: &str| {
+            source_folder(&BuildOptions {
+                recipe: recipe.into(),
+                source: None,
+                out: "out".into(),
+                scenes: Vec::new(),
+                force: false,
+                blender: None,
+                atlas_cache: None,
+            })
+        };
+        for (recipe, folder) in [("mini.toml", "."), ("recipes/mini.toml", "recipes"), ("/mini.toml", "/")] {
+            assert_eq!(source(recipe), Path::new(folder));
+            assert!(std::path::absolute(source(recipe)).is_ok());
+        }
+    }
 }

@@ -2,31 +2,34 @@
 //!
 //! The input is a dataset with its ground truth. The output is a dataset without ground truth, from which methods make
 //! submissions that are scored on the true one. Topology, atlases and the photo stay; `motion` moves the vertices of
-//! furniture, and `scene` writes meshes, `scene.json` and the pictures of geometry again. `levels` lists the
-//! amounts, `crossing` finds furniture that passes through walls.
+//! furniture by the amount of a level and finds furniture that passes through walls. Meshes, `scene.json` and the pictures
+//! of geometry are written again.
 
-mod crossing;
-mod levels;
 mod motion;
-mod scene;
 
+use std::num::NonZeroU16;
 use std::path::Path;
+use std::sync::Arc;
 
-use mateval_scene::dataset::DatasetFile;
-use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth};
+use mateval_scene::dataset::{DatasetFile, Instance, SceneFile};
+use mateval_scene::glb::{self, GlbNode};
+use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, part_picture};
 use mateval_scene::open::Dataset;
 use mateval_scene::perturbation::{Perturbation, PerturbationKind, PerturbedGeometry};
+use mateval_scene::reference::ReferenceScene;
 use mateval_scene::work_folder::{WorkFolder, check_holds_none};
-use mateval_scene::{Progress, Report, SceneError, json, manifest};
+use mateval_scene::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference_io};
+use mateval_tracer::World;
 
 use crate::error::PrepError;
-pub use levels::most_level;
-pub use scene::PerturbedScene;
+use crate::scene_meshes::{self, Faults, Meshes};
+use crate::views::{ViewScene, note_nearest, unseen_share, write_geometry, write_parts};
+pub use motion::most_level;
+use motion::{Amount, Motion, amounts, crossing};
 
 /// What to do with the furniture of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct PerturbOptions {
-    /// The kind of difference.
     pub kind: PerturbationKind,
     /// The level, at most [`most_level`]; 0 changes nothing.
     pub level: u32,
@@ -63,10 +66,10 @@ pub fn perturb(
     }
     // The files that stay, then those of each scene.
     let work = WorkFolder::start(out)?;
-    let amount = options.level.checked_sub(1).map(|at| levels::amounts(options.kind)[at as usize]);
+    let amount = options.level.checked_sub(1).map(|at| amounts(options.kind)[at as usize]);
     let entries = manifest::entries(root)?;
     let files = entries.iter().map(|entry| entry.file.as_str()).filter(|file| !is_ground_truth(file));
-    let stays = |file: &&str| amount.is_none() || !scene::is_rewritten(file);
+    let stays = |file: &&str| amount.is_none() || !is_rewritten(file);
     files.filter(stays).try_for_each(|file| copy(root, work.path(), file))?;
     let Some(amount) = amount else {
         [MANIFEST, DATASET].into_iter().try_for_each(|file| copy(root, work.path(), file))?;
@@ -77,7 +80,7 @@ pub fn perturb(
     for (at, scene) in dataset.scenes.iter().enumerate() {
         progress(Report::part(&format!("scene {}", scene.id), at, dataset.scenes.len()));
         let to = SceneFolder::of(work.path(), &scene.id);
-        perturbed.push(scene::write(&dataset.folder(&scene.id), &to, scene, amount, options.seed)?);
+        perturbed.push(write_scene(&dataset.folder(&scene.id), &to, scene, amount, options.seed)?);
     }
     if perturbed.iter().all(|scene| scene.moved == 0) {
         return Err(PrepError::NoFurniture { path: root.to_owned() });
@@ -101,4 +104,174 @@ fn copy(from: &Path, to: &Path, file: &str) -> Result<(), PrepError> {
         std::fs::create_dir_all(folder).map_err(PrepError::io("make", folder))?;
     }
     std::fs::copy(from.join(file), &place).map(|_| ()).map_err(PrepError::io("write", &place))
+}
+
+/// What happened to a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PerturbedScene {
+    pub scene: SceneId,
+    /// The number of pieces of furniture that were moved.
+    pub moved: usize,
+    /// The pieces that pass through architecture, and did not before.
+    pub crossing: Vec<InstanceId>,
+}
+
+impl PerturbedScene {
+    /// A scene in which nothing was moved.
+    pub(super) fn unchanged(scene: &SceneId) -> Self {
+        Self { scene: scene.clone(), moved: 0, crossing: Vec::new() }
+    }
+}
+
+/// Whether [`write_scene`] writes this public file of a dataset.
+fn is_rewritten(file: &str) -> bool {
+    let Some((_, in_scene)) = file.strip_prefix("scenes/").and_then(|rest| rest.split_once('/')) else { return false };
+    let is_photo = in_scene.ends_with("/rgb.exr") || in_scene.ends_with("/rgb.png");
+    in_scene == "scene.json" || in_scene.starts_with("geometry/") || in_scene.starts_with("views/") && !is_photo
+}
+
+/// Writes meshes, `scene.json` and the pictures of geometry of the scene in `from`, moved by `amount`, to `to`.
+fn write_scene(
+    from: &SceneFolder,
+    to: &SceneFolder,
+    scene: &SceneFile,
+    amount: Amount,
+    seed: u64,
+) -> Result<PerturbedScene, PrepError> {
+    // The true scene, and the displacement of each instance.
+    let mut reference = reference_io::read(from)?;
+    let mut faults = Faults::default();
+    let Some(meshes) = scene_meshes::check(from, scene, &mut faults) else {
+        return Err(SceneError::Invalid { path: from.path().to_owned(), findings: faults.all }.into());
+    };
+    let motions: Vec<Option<Motion>> = scene
+        .instances
+        .iter()
+        .zip(&reference.surfaces)
+        .map(|(instance, surface)| {
+            instance.role.is_furniture().then(|| Motion::new(amount, seed, (&scene.id, &instance.id), &surface.mesh))
+        })
+        .collect();
+    let true_scene = reference.clone();
+    for (surface, motion) in reference.surfaces.iter_mut().zip(&motions) {
+        surface.mesh = moved(motion.as_ref(), &surface.mesh);
+    }
+    // The meshes.
+    let folder = to.path().join("geometry");
+    std::fs::create_dir_all(&folder).map_err(PrepError::io("make", &folder))?;
+    let motion_of = |id: &InstanceId| {
+        let at = scene.instances.iter().position(|instance| instance.id == *id);
+        at.and_then(|at| motions[at].as_ref())
+    };
+    let nodes = |nodes: &[GlbNode], owners: &[&InstanceId]| -> Vec<GlbNode> {
+        let node = |(node, owner): (&GlbNode, &&InstanceId)| GlbNode {
+            name: node.name.clone(),
+            mesh: moved(motion_of(owner), &node.mesh),
+        };
+        nodes.iter().zip(owners).map(node).collect()
+    };
+    let instances: Vec<&InstanceId> = scene.instances.iter().map(|instance| &instance.id).collect();
+    glb::write(&to.instances(), &nodes(&meshes.instances, &instances))?;
+    for (set, parts) in scene.all_part_sets() {
+        let owners: Vec<&InstanceId> = parts.iter().map(|part| &part.instance).collect();
+        glb::write(&to.parts(set), &nodes(&glb::read(&from.parts(set))?, &owners))?;
+    }
+    // The pictures, and what follows from them.
+    let crossing = new_crossings(scene, &true_scene, &reference)?;
+    let shown = write_pictures(to, scene, &meshes, reference)?;
+    json::write(&to.scene_file(), &with_measures(scene, &true_scene, &motions, &shown))?;
+    Ok(PerturbedScene { scene: scene.id.clone(), moved: motions.iter().flatten().count(), crossing })
+}
+
+fn moved(motion: Option<&Motion>, mesh: &TriangleMesh) -> TriangleMesh {
+    motion.map_or_else(|| mesh.clone(), |motion| motion.apply(mesh))
+}
+
+/// The pieces of furniture that pass through architecture in `now` and do not in `before`.
+fn new_crossings(
+    scene: &SceneFile,
+    before: &ReferenceScene,
+    now: &ReferenceScene,
+) -> Result<Vec<InstanceId>, PrepError> {
+    let of = |reference: &ReferenceScene| {
+        let meshes = |belongs: &dyn Fn(&Instance) -> bool| -> Vec<usize> {
+            (0..scene.instances.len()).filter(|at| belongs(&scene.instances[*at])).collect()
+        };
+        let mesh = |at: usize| &reference.surfaces[at].mesh;
+        let pieces = meshes(&|instance| instance.role.is_furniture());
+        let walls = meshes(&|instance| instance.role.is_architecture());
+        let [pieces, walls] = [pieces, walls].map(|all| all.into_iter().map(mesh).collect::<Vec<_>>());
+        crossing(&pieces, &walls)
+    };
+    let pieces = scene.instances.iter().filter(|instance| instance.role.is_furniture());
+    let all = pieces.zip(of(before)?).zip(of(now)?);
+    Ok(all.filter(|((_, before), now)| *now && !before).map(|((piece, _), _)| piece.id.clone()).collect())
+}
+
+/// What the pictures of all views show.
+struct Shown {
+    /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
+    nearest: Vec<Option<f64>>,
+    /// The share of the valid pixels of each view that the input view does not show.
+    unseen_shares: Vec<f64>,
+}
+
+/// Writes the pictures of geometry of every view.
+fn write_pictures(
+    to: &SceneFolder,
+    scene: &SceneFile,
+    meshes: &Meshes,
+    reference: ReferenceScene,
+) -> Result<Shown, PrepError> {
+    let reference = Arc::new(reference);
+    let world = World::new(reference.clone())?;
+    let instances: Vec<u16> = scene.instances.iter().map(|instance| instance.index.0.get()).collect();
+    let scored: Vec<bool> = scene.instances.iter().map(|instance| instance.atlas.is_some()).collect();
+    let parts: Vec<(String, Vec<Vec<u16>>)> = scene
+        .all_part_sets()
+        .zip(&meshes.part_sets)
+        .map(|((set, parts), of_triangles)| {
+            let value = |part: &usize| NonZeroU16::get(parts[*part].index.0);
+            (part_picture(set), of_triangles.iter().map(|of| of.iter().map(value).collect()).collect())
+        })
+        .collect();
+    let view_scene = ViewScene::new(&reference, &world, &instances, &scored);
+    let mut nearest = [vec![None; instances.len()], vec![None; instances.len()]];
+    let mut unseen_shares = Vec::new();
+    for (at, view) in scene.views.iter().enumerate() {
+        let (geometry, _) = view_scene.pictures(&view.camera, &scene.views[0].camera);
+        note_nearest(&geometry, &mut nearest[usize::from(at > 0)]);
+        unseen_shares.push(unseen_share(&geometry));
+        let shown = to.view(&view.id);
+        std::fs::create_dir_all(&shown).map_err(PrepError::io("make", &shown))?;
+        write_geometry(to, &view.id, &geometry)?;
+        write_parts(&shown, &geometry, &parts)?;
+    }
+    let [input, others] = nearest;
+    let nearest = input.into_iter().zip(others).map(|(first, other)| first.or(other)).collect();
+    Ok(Shown { nearest, unseen_shares })
+}
+
+/// `scene.json` with the numbers that follow from the geometry: the lengths of texels and of half a pixel of the input
+/// view, and what wide views show of the unseen.
+fn with_measures(
+    scene: &SceneFile,
+    true_scene: &ReferenceScene,
+    motions: &[Option<Motion>],
+    shown: &Shown,
+) -> SceneFile {
+    let mut scene = scene.clone();
+    for (view, unseen_share) in scene.views.iter_mut().zip(&shown.unseen_shares) {
+        view.wide.iter_mut().for_each(|wide| wide.unseen_share = *unseen_share);
+    }
+    let focal = scene.views[0].camera.intrinsics.fx;
+    for (at, instance) in scene.instances.iter_mut().enumerate() {
+        let Some(atlas) = &mut instance.atlas else { continue };
+        atlas.half_pixel_m = shown.nearest[at].map(|depth| 0.5 * depth / focal);
+        if let Some(motion) = &motions[at] {
+            let mesh = &true_scene.surfaces[at].mesh;
+            atlas.texel_m *= (motion.apply(mesh).area() / mesh.area()).sqrt();
+        }
+    }
+    scene
 }

@@ -1,13 +1,48 @@
-//! The displacement of one piece of furniture, as a function of place. The directions depend on seed and instance
-//! alone, so that a higher level moves a piece the same way further.
+//! The displacement of one piece of furniture, as a function of place, by the level of its kind of perturbation.
+//!
+//! The directions depend on seed and instance alone, so that a higher level moves a piece the same way further.
 
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec3};
 use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{InstanceId, SceneId, TriangleMesh, splitmix64};
+use mateval_tracer::{Accel, Ray, TracerError};
 
-use super::levels::Amount;
+/// How far a level moves every piece of furniture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Amount {
+    /// A distance in the plane of the floor, and an angle about the vertical.
+    Pose { distance_m: f64, angle_deg: f64 },
+    /// The share by which a piece grows or shrinks.
+    Scale { share: f64 },
+    /// The largest distance by which a point of the surface moves.
+    Shape { most_m: f64 },
+}
+
+const POSE: [Amount; 3] = [
+    Amount::Pose { distance_m: 0.01, angle_deg: 1.0 },
+    Amount::Pose { distance_m: 0.05, angle_deg: 5.0 },
+    Amount::Pose { distance_m: 0.1, angle_deg: 5.0 },
+];
+const SCALE: [Amount; 2] = [Amount::Scale { share: 0.02 }, Amount::Scale { share: 0.05 }];
+const SHAPE: [Amount; 3] =
+    [Amount::Shape { most_m: 0.005 }, Amount::Shape { most_m: 0.01 }, Amount::Shape { most_m: 0.03 }];
+
+/// The amounts of the levels 1, 2 and so on.
+pub(super) fn amounts(kind: PerturbationKind) -> &'static [Amount] {
+    match kind {
+        PerturbationKind::Pose => &POSE,
+        PerturbationKind::Scale => &SCALE,
+        PerturbationKind::Shape => &SHAPE,
+    }
+}
+
+/// The highest level of a kind.
+pub fn most_level(kind: PerturbationKind) -> u32 {
+    amounts(kind).len() as u32
+}
 
 /// The wavelength of the noise that bends surfaces, in metres.
 const WAVELENGTH_M: f64 = 0.4;
@@ -122,11 +157,35 @@ fn turn_about_y(angle: f64) -> DMat3 {
     DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
 }
 
+/// Edges are shortened by this share at both ends, so that a piece that touches a wall does not cross it.
+const SPARED: f32 = 0.01;
+
+/// For each mesh of `pieces`, whether an edge of a triangle passes through one of `walls`.
+pub(super) fn crossing(pieces: &[&TriangleMesh], walls: &[&TriangleMesh]) -> Result<Vec<bool>, TracerError> {
+    if walls.is_empty() {
+        return Ok(vec![false; pieces.len()]);
+    }
+    let walls = Accel::build(walls)?;
+    let passes = |from: Vec3, to: Vec3| {
+        let way = to - from;
+        let direction = way.try_normalize();
+        direction.is_some_and(|direction| {
+            let reach = way.length() * (1.0 - 2.0 * SPARED);
+            walls.occluded(&Ray::new(from + way * SPARED, direction, reach))
+        })
+    };
+    let crosses = |mesh: &&TriangleMesh| {
+        (0..mesh.triangles.len()).any(|triangle| {
+            let [a, b, c] = mesh.corners(triangle);
+            passes(a, b) || passes(b, c) || passes(c, a)
+        })
+    };
+    Ok(pieces.iter().map(crosses).collect())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::levels::amounts;
     use super::*;
-    use mateval_scene::perturbation::PerturbationKind;
 
     fn triangle() -> TriangleMesh {
         TriangleMesh {
@@ -204,5 +263,27 @@ mod tests {
         let found = motion.apply(&mesh).normals.unwrap()[0].as_dvec3();
         assert!((found - expected).length() < 1e-4, "{found} {expected}");
         assert!((expected - DVec3::Y).length() > 0.01);
+    }
+
+    fn square_at(x: f32, side: f32) -> TriangleMesh {
+        let corner = |y: f32, z: f32| Vec3::new(x, y * side, z * side);
+        TriangleMesh {
+            positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn a_piece_in_the_wall_crosses_it_and_one_that_touches_it_does_not() {
+        let wall = square_at(0.0, 2.0);
+        let tip = |x: f32| TriangleMesh {
+            positions: vec![Vec3::new(x, 0.1, 0.0), Vec3::new(x + 0.5, 0.2, 0.1), Vec3::new(x + 0.5, 0.1, 0.3)],
+            triangles: vec![[0, 1, 2]],
+            ..Default::default()
+        };
+        let [through, touching, apart] = [tip(-0.25), tip(0.0), tip(0.1)];
+        assert_eq!(crossing(&[&through, &touching, &apart], &[&wall]).unwrap(), [true, false, false]);
+        assert_eq!(crossing(&[&through], &[]).unwrap(), [false]);
     }
 }

@@ -1,4 +1,4 @@
-//! The faults of a recipe, all of which are reported at once.
+//! The faults of a recipe, all of which are reported at once, and the ranges of its numbers.
 
 use std::path::PathBuf;
 
@@ -6,70 +6,42 @@ use mateval_scene::findings::shortened;
 use mateval_scene::{PartSetId, SceneError, SceneId, ViewId};
 use mateval_sources::below::BelowError;
 
-use super::limits::{ATLAS_SIZES, FARTHEST_M, RESOLUTION};
+/// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers are
+/// centimetres apart.
+pub(super) const FARTHEST_M: f64 = 1e6;
+/// Least and most pixels of a picture's side.
+pub(crate) const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;
+/// Least and most texels of an atlas's side.
+pub const ATLAS_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 
-/// One fault of a recipe.
 #[derive(Debug, thiserror::Error)]
 pub enum RecipeFault {
     /// The file is not TOML, or has other keys or types than a recipe.
     #[error("{}", .0.to_string().trim_end())]
     Syntax(Box<toml::de::Error>),
-    /// The recipe has no scene.
     #[error("it has no scene; add a [[scene]] with `id` and the key of a source")]
     NoScenes,
-    /// The number of samples is out of range.
     #[error("samples = {found}: expected 1 to {most}")]
-    Samples {
-        /// The number in the recipe.
-        found: u32,
-        /// The largest number allowed.
-        most: u32,
-    },
+    Samples { found: u32, most: u32 },
     /// Two views have the same id, or one has the input view's.
     #[error("view '{id}' is listed twice ('input' is the id of the input view)")]
-    RepeatedView {
-        /// The id.
-        id: ViewId,
-    },
-    /// A view's turns are too large.
+    RepeatedView { id: ViewId },
     #[error("view '{id}': found turns of {x_deg} and {y_deg} degrees, expected at most 90 about X and 180 about Y")]
-    Turns {
-        /// The view's id.
-        id: ViewId,
-        /// Degrees about X.
-        x_deg: f64,
-        /// Degrees about Y.
-        y_deg: f64,
-    },
+    Turns { id: ViewId, x_deg: f64, y_deg: f64 },
     /// A turned view has the id of a wide one.
     #[error(
         "view '{id}': ids that begin with '{}' are those of views from other places; choose another id",
         ViewId::WIDE
     )]
-    TurnedId {
-        /// The view's id.
-        id: ViewId,
-    },
+    TurnedId { id: ViewId },
     /// A wide view has the id of a turned one.
     #[error("wide: view '{id}': the id must begin with '{}'", ViewId::WIDE)]
-    WideId {
-        /// The view's id.
-        id: ViewId,
-    },
-    /// There are too many wide views, or none.
+    WideId { id: ViewId },
     #[error("wide: count = {found}: expected {least} to {most}")]
-    WideCount {
-        /// The number in the recipe.
-        found: u32,
-        /// The smallest number allowed.
-        least: u32,
-        /// The largest number allowed.
-        most: u32,
-    },
+    WideCount { found: u32, least: u32, most: u32 },
     /// The range of distances of wide views is out of range, or falls.
     #[error("wide: distance_m = {found:?}: expected two rising numbers from {least} to {most}")]
     WideDistance {
-        /// The range in the recipe.
         found: [f64; 2],
         /// The smallest distance allowed, in metres.
         least: f64,
@@ -79,16 +51,13 @@ pub enum RecipeFault {
     /// A wide view stands too near to the input camera, or too far.
     #[error("wide: view '{id}': offset_m = {found:?}: expected a length of {least} to {most} m")]
     WideOffset {
-        /// The view's id.
         id: ViewId,
-        /// The offset in the recipe.
         found: [f64; 3],
         /// The smallest length allowed, in metres.
         least: f64,
         /// The largest length allowed, in metres.
         most: f64,
     },
-    /// Pictures are too small or too large.
     #[error("{owner}: resolution = {found:?}: expected {} to {} a side", RESOLUTION.start(), RESOLUTION.end())]
     Resolution {
         /// The recipe or the scene, as messages name it.
@@ -96,43 +65,28 @@ pub enum RecipeFault {
         /// Width and height in the recipe.
         found: [u32; 2],
     },
-    /// Atlases are too small or too large.
     #[error("{owner}: atlas_size = {found}: expected {} to {}", ATLAS_SIZES.start(), ATLAS_SIZES.end())]
     AtlasSize {
         /// The recipe or the scene, as messages name it.
         owner: String,
-        /// The size in the recipe.
         found: u32,
     },
-    /// Two scenes have the same id.
     #[error("scene '{scene}' is listed twice")]
-    RepeatedScene {
-        /// The id.
-        scene: SceneId,
-    },
-    /// One scene is at fault.
+    RepeatedScene { scene: SceneId },
     #[error("scene '{scene}': {fault}")]
-    Scene {
-        /// The scene.
-        scene: SceneId,
-        /// Its fault.
-        fault: RecipeSceneFault,
-    },
+    Scene { scene: SceneId, fault: RecipeSceneFault },
 }
 
 /// One fault of a scene in a recipe.
 #[derive(Debug, thiserror::Error)]
 pub enum RecipeSceneFault {
-    /// The scene names no source, or more than one.
     #[error("expected exactly one of the keys `{}`", keys.join("`, `"))]
     NotOneSource {
         /// The keys that name a source.
         keys: &'static [&'static str],
     },
-    /// The source has no camera of its own.
     #[error("a room needs a camera, as in `camera = {{ seed = 1 }}`")]
     NoCamera,
-    /// A seed of roughnesses that are not drawn.
     #[error("`appearance_seed` needs `appearance = \"stated\"`")]
     UnusedSeed,
     /// The source cannot draw cameras and has no designers' cameras.
@@ -141,84 +95,56 @@ pub enum RecipeSceneFault {
     /// A camera is too far away, or its field of view is out of range.
     #[error("camera: expected coordinates of at most {FARTHEST_M} m and 0 < fov_y_deg < 179")]
     CameraRange,
-    /// The exposure is not a positive number.
     #[error("exposure = {found}: expected a number above 0")]
-    Exposure {
-        /// The exposure in the recipe.
-        found: f64,
-    },
-    /// A folder of labels lies elsewhere.
+    Exposure { found: f64 },
     #[error("part_labels.{set} = '{}': expected a folder below {root}, relative to it", folder.display())]
     LabelFolder {
-        /// The set of parts.
         set: PartSetId,
-        /// The path in the recipe.
         folder: PathBuf,
         /// The folder that the path must be relative to, as messages name it.
         root: &'static str,
     },
-    /// The photo lies elsewhere.
     #[error("photo = '{}': expected a file below {root}, relative to it", file.display())]
     PhotoPath {
-        /// The path in the recipe.
         file: PathBuf,
         /// The folder that the path must be relative to, as messages name it.
         root: &'static str,
     },
-    /// An input's path leads elsewhere.
     #[error("inputs: '{file}': expected a path below the scene's folder")]
-    InputPath {
-        /// The path in the recipe.
-        file: String,
-    },
-    /// An input's hash is not a SHA-256.
+    InputPath { file: String },
     #[error("inputs: '{file}' = '{}': expected a SHA-256, 64 lower-case hexadecimal digits", shortened(found))]
-    InputHash {
-        /// The input's path.
-        file: String,
-        /// The text in the recipe.
-        found: String,
-    },
+    InputHash { file: String, found: String },
     /// A path of the source does not lie below the source's folder.
     #[error("{key}: {source}; name the folder that contains all paths of the scene with --source")]
-    OutsideSource {
-        /// The key in the recipe.
-        key: &'static str,
-        /// Where the path leads.
-        source: BelowError,
-    },
+    OutsideSource { key: &'static str, source: BelowError },
     /// A file or folder of the source does not exist.
     #[error("there is no {kind} '{}'; correct `{key}`, or name the folder with --source", path.display())]
     MissingSource {
-        /// The key in the recipe.
         key: &'static str,
         /// `file` or `folder`.
         kind: &'static str,
-        /// The path.
         path: PathBuf,
     },
-    /// A pinned input does not exist.
     #[error("input '{file}' does not exist, or is not an ordinary file")]
-    MissingInput {
-        /// The input's path.
-        file: String,
-    },
-    /// A pinned input cannot be read.
+    MissingInput { file: String },
     #[error("input '{file}' cannot be hashed: {source}")]
-    UnreadableInput {
-        /// The input's path.
-        file: String,
-        /// The reason.
-        source: SceneError,
-    },
-    /// A pinned input has other bytes.
+    UnreadableInput { file: String, source: SceneError },
     #[error("input '{file}' has the hash {found}, expected {pinned}; get the file that the release was made of")]
-    ChangedInput {
-        /// The input's path.
-        file: String,
-        /// Its SHA-256.
-        found: String,
-        /// The SHA-256 in the recipe.
-        pinned: String,
-    },
+    ChangedInput { file: String, found: String, pinned: String },
+}
+
+/// Adds a [`RecipeFault`] for each size that is out of range. `owner` is the recipe or the scene, as messages name it.
+pub(super) fn check_sizes(
+    owner: &str,
+    resolution: Option<[u32; 2]>,
+    atlas_size: Option<u32>,
+    faults: &mut Vec<RecipeFault>,
+) {
+    let owner = || owner.to_owned();
+    if let Some(found) = resolution.filter(|sides| !sides.iter().all(|side| RESOLUTION.contains(side))) {
+        faults.push(RecipeFault::Resolution { owner: owner(), found });
+    }
+    if let Some(found) = atlas_size.filter(|size| !ATLAS_SIZES.contains(size)) {
+        faults.push(RecipeFault::AtlasSize { owner: owner(), found });
+    }
 }

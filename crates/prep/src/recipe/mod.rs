@@ -1,37 +1,26 @@
-//! A recipe: the scenes that a dataset consists of, and the settings of their pictures and atlases.
+//! A recipe: the scenes that a dataset consists of, and the settings of their views, pictures and atlases.
 //!
 //! Paths are relative to the recipe's folder, or to the folder that `--source` names.
 
-mod camera;
 pub mod fault;
-mod limits;
 mod scene;
-mod sizes;
-#[cfg(test)]
-mod tests;
-mod text;
-mod views;
-mod wide;
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
+use mateval_image::file_kind::{hint, mistaken_for, without_mark};
+use mateval_image::limits::read_at_most;
+use mateval_scene::ViewId;
 use mateval_scene::dataset::TrueMaterials;
 use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
 use crate::error::PrepError;
-pub use camera::{GivenCamera, RecipeCamera};
-use fault::RecipeFault;
-pub use limits::ATLAS_SIZES;
-pub(crate) use limits::RESOLUTION;
+pub(crate) use fault::RESOLUTION;
+use fault::{RecipeFault, check_sizes};
 pub(crate) use scene::SourcePath;
-pub use scene::{AppearanceWord, Front3dRoom, RecipeScene, RecipeSource};
-use sizes::check_sizes;
-pub(crate) use text::read_text;
-pub use views::Offset;
-pub(crate) use views::default_views;
-pub use wide::{DrawnViews, WideOffset, WideViews};
+pub use scene::{AppearanceWord, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource};
 
 /// The name of the recipe in the dataset.
 pub const RECIPE: &str = "recipe.toml";
@@ -43,9 +32,7 @@ pub const MOST_SAMPLES: u32 = 1 << 16;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// The dataset's name.
     pub name: String,
-    /// The dataset's version.
     #[serde(default = "default_version")]
     pub version: String,
     /// Width and height in pixels; if absent, the source's own.
@@ -66,7 +53,6 @@ pub struct Recipe {
     /// Samples a pixel of each half of a rendered picture.
     #[serde(default = "default_samples")]
     pub samples: u32,
-    /// The scenes.
     #[serde(default, rename = "scene")]
     pub scenes: Vec<RecipeScene>,
 }
@@ -130,5 +116,321 @@ impl Recipe {
             }
         }
         self.wide.iter().for_each(|wide| wide.check(faults));
+    }
+}
+
+/// A novel view: the input camera turned about its own axes.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Offset {
+    pub id: ViewId,
+    /// Degrees about X; up is positive.
+    pub x_deg: f64,
+    /// Degrees about Y, after X; left is positive.
+    pub y_deg: f64,
+}
+
+/// The paper's four views, turned by five degrees about each axis.
+pub(crate) fn default_views() -> Vec<Offset> {
+    [("up_left", 5.0, 5.0), ("up_right", 5.0, -5.0), ("down_left", -5.0, 5.0), ("down_right", -5.0, -5.0)]
+        .map(|(id, x_deg, y_deg)| Offset { id: ViewId::new(id).expect("our own ids are ids"), x_deg, y_deg })
+        .to_vec()
+}
+
+/// Number of wide views of a scene that may be drawn.
+const COUNTS: RangeInclusive<u32> = 1..=16;
+/// Distances from the input camera that may be asked for, in metres: less is no other place, more is another room.
+const DISTANCES_M: RangeInclusive<f64> = 0.05..=10.0;
+
+/// The wide views of every scene of a recipe.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "WideWords")]
+pub enum WideViews {
+    Drawn(DrawnViews),
+    /// At the same offsets in each scene.
+    Given(Vec<WideOffset>),
+}
+
+/// Wide views that are drawn until they stand in free space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawnViews {
+    pub count: u32,
+    /// The distances of the first and the last from the input camera, in metres; those of the others lie evenly in between.
+    pub distance_m: [f64; 2],
+    pub seed: u64,
+}
+
+/// A wide view at a given place. It looks at the same point as all wide views.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WideOffset {
+    /// The view's id, which begins with `wide_`.
+    pub id: ViewId,
+    /// Metres along the input camera's own axes: right, up, and away from what it looks at.
+    pub offset_m: [f64; 3],
+}
+
+/// The keys as they are in the file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WideWords {
+    count: Option<u32>,
+    distance_m: Option<[f64; 2]>,
+    seed: Option<u64>,
+    views: Option<Vec<WideOffset>>,
+}
+
+/// The keys fit together in neither of the two ways.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("wide: expected {{ count, distance_m }} (with or without seed), or {{ views }}")]
+struct UnfitKeys;
+
+impl TryFrom<WideWords> for WideViews {
+    type Error = UnfitKeys;
+
+    fn try_from(words: WideWords) -> Result<Self, UnfitKeys> {
+        match words {
+            WideWords { count: Some(count), distance_m: Some(distance_m), seed, views: None } => {
+                Ok(Self::Drawn(DrawnViews { count, distance_m, seed: seed.unwrap_or(0) }))
+            }
+            WideWords { count: None, distance_m: None, seed: None, views: Some(views) } => Ok(Self::Given(views)),
+            _ => Err(UnfitKeys),
+        }
+    }
+}
+
+impl WideViews {
+    /// Adds a fault for every number that is out of range.
+    pub(super) fn check(&self, faults: &mut Vec<RecipeFault>) {
+        match self {
+            Self::Drawn(DrawnViews { count, distance_m: [near, far], .. }) => {
+                if !COUNTS.contains(count) {
+                    faults.push(RecipeFault::WideCount { found: *count, least: *COUNTS.start(), most: *COUNTS.end() });
+                }
+                if !(DISTANCES_M.contains(near) && DISTANCES_M.contains(far) && near <= far) {
+                    let (least, most) = DISTANCES_M.into_inner();
+                    faults.push(RecipeFault::WideDistance { found: [*near, *far], least, most });
+                }
+            }
+            Self::Given(views) => {
+                for WideOffset { id, offset_m } in views {
+                    let distance = glam::DVec3::from_array(*offset_m).length();
+                    if !DISTANCES_M.contains(&distance) {
+                        let (least, most) = DISTANCES_M.into_inner();
+                        faults.push(RecipeFault::WideOffset { id: id.clone(), found: *offset_m, least, most });
+                    }
+                    if !id.is_wide() {
+                        faults.push(RecipeFault::WideId { id: id.clone() });
+                    }
+                }
+            }
+        }
+    }
+
+    /// The ids of views whose places are given.
+    fn given_ids(&self) -> impl Iterator<Item = &ViewId> {
+        let given = match self {
+            Self::Drawn(_) => &[],
+            Self::Given(views) => views.as_slice(),
+        };
+        given.iter().map(|view| &view.id)
+    }
+}
+
+/// The largest file that is read, in bytes.
+const MAX_BYTES: u64 = 16 << 20;
+
+/// The text of an ordinary file of at most [`MAX_BYTES`].
+pub(crate) fn read_text(path: &Path) -> Result<String, PrepError> {
+    let bytes = read_at_most(path, MAX_BYTES).map_err(PrepError::io("read", path))?;
+    let not_text = |_| {
+        let message = format!("expected UTF-8, found other bytes{}", hint(&bytes));
+        std::io::Error::new(std::io::ErrorKind::InvalidData, message)
+    };
+    let text = std::str::from_utf8(without_mark(&bytes)).map_err(not_text).map_err(PrepError::io("read", path))?;
+    // Text of another kind, such as a Git LFS pointer. TOML may begin like one, as in `#usda`.
+    if mistaken_for(&bytes).is_some() && text.parse::<toml::Table>().is_err() {
+        let message = format!("expected TOML, found another file{}", hint(&bytes));
+        return Err(PrepError::io("read", path)(std::io::Error::new(std::io::ErrorKind::InvalidData, message)));
+    }
+    Ok(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_sources::front3d::AppearanceRule;
+
+    use super::*;
+
+    #[test]
+    fn a_file_of_another_kind_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("recipe.toml");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read_text(&path)
+        };
+        for (bytes, words) in [
+            (b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n".as_slice(), "git lfs pull"),
+            (b"<!DOCTYPE html>\n", "web page"),
+            (b"n\0a\0m\0e\0", "UTF-16"),
+            (b"\xff\xfen\0", "UTF-16"),
+        ] {
+            let error = read(bytes).unwrap_err().to_string();
+            assert!(error.contains("recipe.toml") && error.contains(words), "{error}");
+        }
+        assert_eq!(read(b"\xef\xbb\xbfname = 'x'").unwrap(), "name = 'x'");
+        // TOML, though a USD file begins like it, and what its reader says more about.
+        for sound in ["#usda kitchens\nname = 'x'", "", "no TOML"] {
+            assert_eq!(read(sound.as_bytes()).unwrap(), sound);
+        }
+    }
+
+    fn recipe_of(text: &str) -> Result<Recipe, PrepError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("recipe.toml");
+        std::fs::write(&path, text).unwrap();
+        read(&path).map(|(recipe, _)| recipe)
+    }
+
+    #[test]
+    fn absent_keys_have_their_defaults() {
+        let recipe = recipe_of("name = 'mini'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'").unwrap();
+        assert_eq!(recipe.views.len(), 4);
+        assert_eq!(
+            (recipe.views[1].id.as_str(), recipe.views[1].x_deg, recipe.views[1].y_deg),
+            ("up_right", 5.0, -5.0)
+        );
+        assert_eq!((recipe.samples, recipe.scenes[0].exposure), (64, 1.0));
+    }
+
+    #[test]
+    fn camera_rules_have_names() {
+        let with = |words: &str| recipe_of(&format!("name = 'x'\n{words}\n[[scene]]\nid = 'a'\nbitterli = 'a'\n"));
+        let name = |recipe: Recipe| recipe.camera_rules.name();
+        assert_eq!(name(with("camera_rules = '3dlg'").unwrap()), "3dlg");
+        assert_eq!(name(with("").unwrap()), "blenderproc");
+        let error = with("camera_rules = 'mine'").unwrap_err().to_string();
+        assert!(error.contains("expected one of: blenderproc, 3dlg"), "{error}");
+    }
+
+    #[test]
+    fn all_faults_are_reported_together() {
+        let text = "name = 'x'\nresolution = [4, 9]\nsamples = 0\n\
+        [[scene]]\nid = 'a'\nbitterli = 'a'\nexposure = 0.0\n[[scene]]\nid = 'a'\nbitterli = 'b'\natlas_size = 9";
+        let error = recipe_of(text).unwrap_err().to_string();
+        for part in ["resolution = [4, 9]", "samples = 0", "'a' is listed twice", "exposure = 0", "atlas_size = 9"] {
+            assert!(error.contains(part), "{part} not in {error}");
+        }
+    }
+
+    #[test]
+    fn wide_views_have_ids_and_distances_of_their_own() {
+        let with = |words: &str| recipe_of(&format!("name = 'x'\n{words}\n[[scene]]\nid = 'a'\nbitterli = 'a'\n"));
+        let recipe = with("wide = { count = 4, distance_m = [0.3, 1.0] }").unwrap();
+        let drawn = DrawnViews { count: 4, distance_m: [0.3, 1.0], seed: 0 };
+        assert_eq!(recipe.wide, Some(WideViews::Drawn(drawn)));
+        with("wide = { views = [{ id = 'wide_left', offset_m = [-0.5, 0, 0] }] }").unwrap();
+        for (words, expected) in [
+            ("wide = { count = 0, distance_m = [0.3, 1.0] }", "count = 0: expected 1 to 16"),
+            ("wide = { count = 17, distance_m = [0.3, 1.0] }", "count = 17: expected 1 to 16"),
+            ("wide = { count = 1, distance_m = [1.0, 0.3] }", "distance_m = [1.0, 0.3]: expected two rising numbers"),
+            ("wide = { count = 1, distance_m = [nan, 1.0] }", "distance_m = [NaN, 1.0]"),
+            ("wide = { count = 1 }", "expected { count, distance_m }"),
+            ("wide = { views = [{ id = 'left', offset_m = [1, 0, 0] }] }", "the id must begin with 'wide_'"),
+            ("wide = { views = [{ id = 'wide_1', offset_m = [0, 0, 0] }] }", "expected a length of 0.05 to 10 m"),
+            ("views = [{ id = 'wide_1', x_deg = 1, y_deg = 1 }]", "choose another id"),
+            (
+                "wide = { views = [{ id = 'wide_1', offset_m = [1, 0, 0] }, { id = 'wide_1', offset_m = [2, 0, 0] }] }",
+                "'wide_1' is listed twice",
+            ),
+        ] {
+            let error = with(words).unwrap_err().to_string();
+            assert!(error.contains(expected), "{words}: {error}");
+        }
+    }
+
+    #[test]
+    fn cameras_are_within_a_million_metres() {
+        let at = |x: &str| {
+            let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\n";
+            recipe_of(&format!("{text}camera = {{ position = [{x}, 0, 0], target = [0, 0, 0], fov_y_deg = 40 }}"))
+        };
+        at("1e6").unwrap();
+        for far in ["1.1e6", "-1e300", "inf", "nan"] {
+            assert!(at(far).unwrap_err().to_string().contains("camera: expected coordinates"), "{far}");
+        }
+    }
+
+    #[test]
+    fn inputs_are_hashes_of_files_below() {
+        let with = |file: &str, hash: &str| {
+            recipe_of(&format!("name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\ninputs = {{ '{file}' = '{hash}' }}"))
+        };
+        with("b/c.obj", &"0a".repeat(32)).unwrap();
+        for hash in ["", "0a", &"0A".repeat(32), &"0g".repeat(32), &"0a".repeat(33)] {
+            assert!(
+                with("c.obj", hash).unwrap_err().to_string().contains("64 lower-case hexadecimal digits"),
+                "{hash}"
+            );
+        }
+        for file in ["/dev/zero", "../c.obj"] {
+            assert!(
+                with(file, &"0a".repeat(32)).unwrap_err().to_string().contains("below the scene's folder"),
+                "{file}"
+            );
+        }
+    }
+
+    #[test]
+    fn labels_lie_below_the_scenes_folder() {
+        let with = |folder: &str| {
+            let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'\npart_labels = { one = ";
+            recipe_of(&format!("{text}'{folder}' }}"))
+        };
+        with("labels/one").unwrap();
+        with("labels/../one").unwrap();
+        for bad in ["/labels", "../labels", "labels/../..", "."] {
+            let error = with(bad).unwrap_err().to_string();
+            assert!(error.contains(&format!("part_labels.one = '{bad}'")) && error.contains("XML's folder"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_seed_of_roughnesses_needs_stated_ones() {
+        let with = |words: &str| {
+            let room = "front3d = { house = 'h.json', room = 'R-1', models = 'm', ";
+            recipe_of(&format!("name = 'x'\n[[scene]]\nid = 'a'\n{room}{words} }}\ncamera = {{ seed = 1 }}"))
+        };
+        let rule = |recipe: Recipe| recipe.scenes[0].front3d.as_ref().unwrap().appearance_rule();
+        assert_eq!(rule(with("textures = 't'").unwrap()), AppearanceRule::Constant);
+        assert_eq!(rule(with("appearance = 'stated'").unwrap()), AppearanceRule::Stated { seed: 0 });
+        assert_eq!(
+            rule(with("appearance = 'stated', appearance_seed = 7").unwrap()),
+            AppearanceRule::Stated { seed: 7 }
+        );
+        let error = with("appearance_seed = 7").unwrap_err().to_string();
+        assert!(error.contains("`appearance_seed` needs"), "{error}");
+    }
+
+    #[test]
+    fn unknown_words_are_refused_with_their_line() {
+        let error = recipe_of("name = 'x'\nresolutoin = [4, 9]").unwrap_err().to_string();
+        assert!(error.contains("resolutoin") && error.contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn a_gltf_is_a_source() {
+        let with = |words: &str| recipe_of(&format!("name = 'x'\n[[scene]]\nid = 'a'\ngltf = 'rooms/a.glb'\n{words}"));
+        let recipe = with("").unwrap();
+        assert_eq!(recipe.scenes[0].source().unwrap(), RecipeSource::Gltf(Path::new("rooms/a.glb")));
+        assert_eq!(recipe.scenes[0].root(Path::new("all")), Path::new("all/rooms"));
+        for (words, message) in [
+            ("bitterli = 'b.xml'", "exactly one of the keys `bitterli`, `front3d`, `gltf`"),
+            ("camera = { seed = 1 }", "`seed` and `designer` are for `front3d`"),
+            ("part_labels = { one = '../labels' }", "glTF's folder"),
+        ] {
+            assert!(with(words).unwrap_err().to_string().contains(message), "{words}");
+        }
     }
 }

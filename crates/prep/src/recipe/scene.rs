@@ -1,4 +1,4 @@
-//! One scene of a recipe: its source, where the source's files are, and the settings of the scene.
+//! One scene of a recipe: its source, where the source's files are, its camera, and the settings of the scene.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,18 +8,14 @@ use mateval_scene::{PartSetId, SceneId};
 use mateval_sources::front3d::AppearanceRule;
 use serde::Deserialize;
 
-use super::camera::RecipeCamera;
-use super::fault::{RecipeFault, RecipeSceneFault};
-use super::sizes::check_sizes;
+use super::fault::{FARTHEST_M, RecipeFault, RecipeSceneFault, check_sizes};
 
 /// The keys of a scene that name its source.
 const SOURCE_KEYS: [&str; 4] = ["bitterli", "front3d", "gltf", "blend"];
 
-/// One scene of a recipe.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeScene {
-    /// Its id.
     pub id: SceneId,
     /// The scene's Mitsuba XML. Every scene names exactly one source.
     pub bitterli: Option<PathBuf>,
@@ -62,7 +58,6 @@ pub struct RecipeScene {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Front3dRoom {
-    /// The house's JSON.
     pub house: PathBuf,
     /// The room's instanceid, as in `LivingDiningRoom-1912`.
     pub room: String,
@@ -103,22 +98,17 @@ impl Front3dRoom {
     }
 }
 
-/// The source of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecipeSource<'a> {
-    /// A Mitsuba XML.
     Bitterli(&'a Path),
     /// A room of a 3D-FRONT house.
     Front3d(&'a Front3dRoom),
-    /// A glTF.
     Gltf(&'a Path),
-    /// A Blender file.
     Blend(&'a Path),
 }
 
 /// A path that a scene's source needs.
 pub(crate) struct SourcePath {
-    /// The key in the recipe.
     pub(crate) key: &'static str,
     /// The path as the recipe states it.
     pub(crate) path: PathBuf,
@@ -144,8 +134,8 @@ impl RecipeScene {
         }
     }
 
-    /// The folder that the paths of the scene's files are relative to: the folder of the XML, glTF or .blend file, or else `source`,
-    /// the folder that the recipe's paths are relative to.
+    /// The folder that the paths of the scene's files are relative to: the folder of the XML, glTF or .blend file, or
+    /// else `source`, the folder that the recipe's paths are relative to.
     pub fn root(&self, source: &Path) -> PathBuf {
         match self.main_file() {
             Some(file) => source.join(file).parent().map(Path::to_owned).unwrap_or_default(),
@@ -245,6 +235,89 @@ impl RecipeScene {
             if hash.len() != 64 || !hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f')) {
                 faults.push(RecipeSceneFault::InputHash { file: file.clone(), found: hash.clone() });
             }
+        }
+    }
+}
+
+/// The input camera of a scene.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "CameraWords")]
+pub enum RecipeCamera {
+    /// Placed by hand.
+    Given(GivenCamera),
+    /// Found by drawing cameras in the room until one sees enough. The same seed finds the same camera.
+    Seed {
+        seed: u64,
+        /// Vertical field of view in degrees; if absent, that of the recipe's camera rules.
+        fov_y_deg: Option<f64>,
+    },
+    /// A designer's camera, by its number. It keeps its field of view.
+    Designer(usize),
+}
+
+/// A camera that was placed by hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GivenCamera {
+    /// Its position, in metres.
+    pub position: [f64; 3],
+    /// A point in the middle of the picture, in metres.
+    pub target: [f64; 3],
+    /// Vertical field of view in degrees.
+    pub fov_y_deg: f64,
+}
+
+/// A camera's keys as they are in the file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraWords {
+    position: Option<[f64; 3]>,
+    target: Option<[f64; 3]>,
+    fov_y_deg: Option<f64>,
+    seed: Option<u64>,
+    designer: Option<usize>,
+}
+
+/// The keys of a camera fit together in none of the three ways.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "camera: expected {{ position, target, fov_y_deg }}, {{ seed }} (with or without fov_y_deg), or {{ designer }}"
+)]
+struct UnfitKeys;
+
+impl TryFrom<CameraWords> for RecipeCamera {
+    type Error = UnfitKeys;
+
+    fn try_from(words: CameraWords) -> Result<Self, UnfitKeys> {
+        match words {
+            CameraWords {
+                position: Some(position),
+                target: Some(target),
+                fov_y_deg: Some(fov_y_deg),
+                seed: None,
+                designer: None,
+            } => Ok(Self::Given(GivenCamera { position, target, fov_y_deg })),
+            CameraWords { position: None, target: None, fov_y_deg, seed: Some(seed), designer: None } => {
+                Ok(Self::Seed { seed, fov_y_deg })
+            }
+            CameraWords { position: None, target: None, fov_y_deg: None, seed: None, designer: Some(number) } => {
+                Ok(Self::Designer(number))
+            }
+            _ => Err(UnfitKeys),
+        }
+    }
+}
+
+impl RecipeCamera {
+    /// Whether coordinates and field of view are in range.
+    fn is_in_range(&self) -> bool {
+        let has_sound_field = |fov_y_deg: f64| fov_y_deg > 0.0 && fov_y_deg < 179.0;
+        match self {
+            Self::Given(camera) => {
+                let mut coordinates = camera.position.iter().chain(&camera.target);
+                coordinates.all(|v| v.abs() <= FARTHEST_M) && has_sound_field(camera.fov_y_deg)
+            }
+            Self::Seed { fov_y_deg, .. } => fov_y_deg.is_none_or(has_sound_field),
+            Self::Designer(_) => true,
         }
     }
 }

@@ -1,41 +1,42 @@
 //! The RGB ground truth: every view of every scene without a photo, rendered in two independent halves.
 //!
-//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the photo renderer's name in `dataset.json`,
-//! its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes, `finish` writes them).
+//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the photo renderer's name in
+//! `dataset.json`, its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes,
+//! `finish` writes them).
 //!
-//! A new renderer is a file beside `builtin.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in
-//! the command line's `prep render`.
+//! `run` holds what all renderers share. MatEval's own path tracer renders here, `blender` has Blender render. A new
+//! renderer is a file beside `blender.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in the
+//! command line's `prep render`.
 
-mod blender_scene;
-mod builtin;
-pub(crate) mod kind;
-mod render_run;
-mod report;
-pub(crate) mod store;
+mod blender;
+pub(crate) mod run;
 
 use std::path::Path;
+use std::sync::Arc;
 
+use mateval_image::{ImageError, Picture, exr_io, png_io};
 use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile};
+use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, View};
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder};
 use mateval_scene::open::chosen_ids;
-use mateval_scene::{Progress, SceneId, json};
+use mateval_scene::render_file::RenderFile;
+use mateval_scene::render_noise::RenderNoise;
+use mateval_scene::{Progress, Report, SceneId, json, reference_io};
+use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
+use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
+use crate::blender::LightPictures;
 pub use crate::blender::{BlenderLimits, BlenderProgram};
+use crate::build::finish::{check_strays, finish_again};
 use crate::build::start::is_build;
 use crate::error::PrepError;
-use crate::finish::{check_strays, finish_again};
 use crate::recipe::{self, RECIPE};
-pub use blender_scene::BlenderOptions;
-pub use kind::{RendererKind, UnknownRenderer};
-pub use render_run::MAX_BOUNCES;
-use render_run::RenderRun;
-pub use report::RenderReport;
+pub use blender::BlenderOptions;
+pub use run::{MAX_BOUNCES, RenderReport, RendererKind, UnknownRenderer};
+use run::{RenderRun, ViewRender, seed, seed_texts, write_view};
 
-/// What to render.
 #[derive(Clone, Debug, Default)]
 pub struct RenderOptions {
-    /// The renderer and its options.
     pub renderer: Renderer,
     /// Samples per pixel of each half; the recipe's number where absent.
     pub samples: Option<u32>,
@@ -45,7 +46,6 @@ pub struct RenderOptions {
     pub force: bool,
 }
 
-/// A renderer with its options.
 #[derive(Clone, Debug, Default)]
 pub enum Renderer {
     /// MatEval's own path tracer.
@@ -56,7 +56,6 @@ pub enum Renderer {
 }
 
 impl Renderer {
-    /// Which renderer it is.
     pub fn kind(&self) -> RendererKind {
         match self {
             Self::Builtin => RendererKind::Builtin,
@@ -79,14 +78,17 @@ impl Renderer {
         progress: Progress<'_>,
     ) -> Result<RenderReport, PrepError> {
         match self {
-            Self::Builtin => builtin::render_scenes(run, scenes, progress),
-            Self::Blender(options) => blender_scene::render_scenes(run, options, scenes, progress),
+            Self::Builtin => render_builtin(run, scenes, progress),
+            Self::Blender(options) => blender::render_scenes(run, options, scenes, progress),
         }
     }
 }
 
+const UNFINISHED: &str = "lacks MANIFEST.sha256 or dataset.json: its build did not finish; run `prep build` again, or \
+         `prep finish` where all scenes are made";
+
 /// Renders the dataset in `root`. Where no scenes are chosen, it then names the photo renderer and writes a new manifest;
-/// otherwise [`crate::finish`] does so, and several processes may render different scenes at once.
+/// otherwise [`crate::build::finish`] does so, and several processes may render different scenes at once.
 ///
 /// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
 /// cannot render becomes a failure in the report; the others are still rendered. Scenes with a photo from elsewhere are not
@@ -94,11 +96,11 @@ impl Renderer {
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let build_recipe = is_build(root).then(|| BuildFolder::of(root).recipe());
     if build_recipe.is_some() && !root.join(DATASET).is_file() {
-        return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
+        return Err(PrepError::unusable(root, UNFINISHED));
     }
     let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
     if !root.join(MANIFEST).is_file() {
-        return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
+        return Err(PrepError::unusable(root, UNFINISHED));
     }
     if options.scenes.is_empty() {
         // `finish_again` would find them when all is rendered.
@@ -142,4 +144,95 @@ fn without_photos<'a>(
         if scene.photo.is_some() { photographed.push(id) } else { rendered.push(id) }
     }
     Ok((rendered, photographed))
+}
+
+/// Renders with MatEval's own path tracer the views that no earlier run has rendered, scene by scene.
+fn render_builtin(run: &RenderRun<'_>, scenes: &[&SceneId], progress: Progress<'_>) -> Result<RenderReport, PrepError> {
+    let mut report = RenderReport::default();
+    for (at, id) in scenes.iter().enumerate() {
+        progress(Report::part(&format!("scene {id}"), at, scenes.len()));
+        run.on_scene(id, || render_scene(run, id, progress, &mut report))?;
+    }
+    Ok(report)
+}
+
+fn render_scene(
+    run: &RenderRun<'_>,
+    id: &SceneId,
+    progress: Progress<'_>,
+    report: &mut RenderReport,
+) -> Result<(), PrepError> {
+    let folder = SceneFolder::of(run.root, id);
+    let scene: SceneFile = json::read(&folder.scene_file())?;
+    let mut world: Option<World> = None;
+    for view in &scene.views {
+        let seeds = [0, 1].map(|half| seed(id, view, half));
+        if run.is_done(&folder, view, &seed_texts(seeds)) {
+            report.kept += 1;
+            continue;
+        }
+        let world = match &mut world {
+            Some(world) => world,
+            none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))?),
+        };
+        let step = format!("view {}", view.id);
+        let shown = |done: usize, all: usize| progress(Report::step(&step, done, all));
+        let settings = RenderSettings { samples: run.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
+        let groups = LightGroups::apart(world.emitters().groups());
+        let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
+        let [a, b]: [LightPictures; 2] =
+            std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
+        let shown = without_noise(&folder, view, [&a, &b])?;
+        report.remarks.extend(remark(&format!("{id} {}", view.id), &render.stats));
+        let file = RenderFile {
+            renderer: run.renderer.clone(),
+            renderer_version: None,
+            samples_each_half: run.samples,
+            seeds: seed_texts(seeds),
+            max_bounces: MAX_BOUNCES,
+            capped_throughput: Some(render.stats.capped_throughput),
+            denoiser: noise_filter::NAME.to_owned(),
+            noise: RenderNoise::of([&a.rgb, &b.rgb], &shown.rgb),
+            approximations: Vec::new(),
+        };
+        let render = ViewRender { halves: [&a, &b], shown: &shown, passes: None };
+        write_view(&folder.render(&run.renderer, &view.id), &render, scene.exposure, &file)?;
+        report.rendered += 1;
+    }
+    Ok(())
+}
+
+fn remark(step: &str, stats: &RenderStats) -> Option<String> {
+    (stats.not_finite > 0)
+        .then(|| format!("{step}: left out {} samples that were not finite; please report this bug", stats.not_finite))
+}
+
+fn light_pictures(basis: LightBasis) -> LightPictures {
+    LightPictures { rgb: basis.sum(), groups: basis.pictures().to_vec() }
+}
+
+/// The means of both halves, filtered on the surfaces that the view's maps show.
+fn without_noise(folder: &SceneFolder, view: &View, [a, b]: [&LightPictures; 2]) -> Result<LightPictures, PrepError> {
+    let (shown, hidden) = (folder.view(&view.id), folder.truth_view(&view.id));
+    let base_color = map_of(view, &hidden.join("albedo.exr"), exr_io::read_linear)?;
+    let instances = map_of(view, &shown.join("instance.png"), png_io::read_ids)?;
+    let normals = map_of(view, &shown.join("normal.exr"), exr_io::read_normal)?;
+    let valid = instances.map(|instance| instance != 0);
+    let surfaces = Surfaces { base_color: Some(&base_color), instances: &instances, normals: &normals, valid: &valid };
+    Ok(LightPictures {
+        rgb: filtered_mean([&a.rgb, &b.rgb], &surfaces),
+        groups: a.groups.iter().zip(&b.groups).map(|(a, b)| filtered_mean([a, b], &surfaces)).collect(),
+    })
+}
+
+/// Reads a map of a view. Fails if it has not the size of the camera's picture.
+fn map_of<T: Copy>(
+    view: &View,
+    path: &Path,
+    read: fn(&Path) -> Result<Picture<T>, ImageError>,
+) -> Result<Picture<T>, PrepError> {
+    let map = read(path)?;
+    let k = view.camera.intrinsics;
+    let (expected, found) = ([k.width as usize, k.height as usize], [map.width(), map.height()]);
+    if found == expected { Ok(map) } else { Err(PrepError::MapSize { path: path.to_owned(), expected, found }) }
 }

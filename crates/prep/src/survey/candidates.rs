@@ -1,4 +1,4 @@
-//! The rooms of one house: their properties, and cameras in them with what these see.
+//! The rooms of one house: their properties, and cameras in them with what these see or why they are not offered.
 
 use std::collections::BTreeSet;
 
@@ -8,21 +8,17 @@ use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_scene::TriangleMesh;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::ids::id_text_from;
+use mateval_sources::front3d::FurnishedHouse;
+use mateval_sources::front3d::camera_sampler::{CameraError, RoomSampler, score, score_grid};
 use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
-use super::camera_refusal::{CameraRefusal, RefusedCamera};
 use super::intersect::{MeshIntersection, intersections};
-use super::intersecting_pair::IntersectingPair;
-use super::options::SurveyOptions;
-use super::posed::{CameraDraws, Posed};
-use super::rules::{Rejection, RoomFacts};
-use super::survey_file::{CandidateCamera, SurveyedRoom};
+use super::rules::{RoomFacts, SurveyOptions};
+use super::survey_file::{CandidateCamera, IntersectingPair, Rejection, SurveyedRoom};
 use crate::error::PrepError;
 use crate::recipe::Offset;
-use mateval_sources::front3d::FurnishedHouse;
-use mateval_sources::front3d::camera_sampler::{score, score_grid};
 
 /// A picture of sRGB bytes.
 type Thumbnail = Picture<[u8; 3]>;
@@ -276,6 +272,141 @@ fn thumbnail_camera(camera: &Camera) -> Camera {
         cy: (old.cy - f64::from(old.height) / 2.0) * scale + height / 2.0,
     };
     Camera { intrinsics, ..*camera }
+}
+
+/// A camera and where it comes from.
+struct Posed {
+    /// As in `seed 3` or `designer 5`.
+    pub(super) origin: String,
+    pub(super) camera: Camera,
+    pub(super) fov_y_deg: f64,
+}
+
+/// Draws the cameras of one house.
+struct CameraDraws<'a> {
+    options: &'a SurveyOptions,
+    house: &'a FurnishedHouse,
+    world: &'a World,
+    /// Degrees about X and Y of each novel view.
+    turns: Vec<[f64; 2]>,
+    /// The floor area of each room that has a floor, in square metres.
+    areas: Vec<f64>,
+}
+
+impl<'a> CameraDraws<'a> {
+    pub(super) fn new(
+        options: &'a SurveyOptions,
+        house: &'a FurnishedHouse,
+        world: &'a World,
+        views: &[Offset],
+    ) -> Self {
+        let turns = views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
+        let samplers = (0..house.house.rooms.len()).filter_map(|room| RoomSampler::new(house, world, room).ok());
+        let areas = samplers.map(|sampler| sampler.floor_area_m2()).collect();
+        Self { options, house, world, turns, areas }
+    }
+
+    /// Every camera of a room that may be tried; and why no more could be drawn.
+    fn posed(&self, room: usize) -> (Vec<Posed>, Vec<RefusedCamera>) {
+        let sampler = match RoomSampler::new(self.house, self.world, room) {
+            Ok(sampler) => sampler,
+            Err(why) => return (Vec::new(), vec![RefusedCamera { origin: None, why: why.into() }]),
+        };
+        let (mut posed, refused) = self.drawn(&sampler);
+        posed.extend(self.designers(&sampler));
+        (posed, refused)
+    }
+
+    /// As many cameras as the rules give the room, the best of all draws.
+    fn drawn(&self, sampler: &RoomSampler<'_>) -> (Vec<Posed>, Vec<RefusedCamera>) {
+        let (options, rules) = (self.options, self.options.camera_rules);
+        let [width, height] = options.resolution;
+        let fov_y_deg = options.fov_y_deg;
+        let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
+        let wanted = self.number_of_cameras(sampler);
+        let (mut found, mut refused) = (Vec::new(), Vec::new());
+        for number in 0..wanted * rules.draws_for_each() {
+            let seed = options.seed + u64::from(number);
+            let origin = format!("seed {seed}");
+            match sampler.sample(intrinsics, &self.turns, &rules.sampler_rules(), seed) {
+                Ok(drawn) => found.push((drawn.score, Posed { origin, camera: drawn.camera, fov_y_deg })),
+                Err(why) => {
+                    // Another seed would take as long and is unlikely to succeed.
+                    refused.push(RefusedCamera { origin: Some(origin), why: why.into() });
+                    break;
+                }
+            }
+        }
+        // Stable: of equal scores the earlier draw.
+        found.sort_by(|one, other| other.0.total_cmp(&one.0));
+        found.truncate(wanted as usize);
+        (found.into_iter().map(|(_, posed)| posed).collect(), refused)
+    }
+
+    fn number_of_cameras(&self, sampler: &RoomSampler<'_>) -> u32 {
+        let total: f64 = self.areas.iter().sum();
+        let share = if total > 0.0 { sampler.floor_area_m2() / total } else { 0.0 };
+        self.options.camera_rules.cameras_of_room(self.options.cameras_per_room, self.areas.len(), share)
+    }
+
+    /// The designers' cameras that stand in the room.
+    fn designers(&self, sampler: &RoomSampler<'_>) -> Vec<Posed> {
+        let [width, height] = self.options.resolution;
+        let own = self.house.cameras.iter().filter(|camera| sampler.stands_in_room(camera.position));
+        let posed = own.filter_map(|camera| {
+            let intrinsics = Intrinsics::from_fov_y(width, height, camera.fov_y_deg.to_radians());
+            let posed = Camera::look_at(camera.position, camera.target, glam::DVec3::Y, intrinsics)?;
+            Some(Posed { origin: format!("designer {}", camera.number), camera: posed, fov_y_deg: camera.fov_y_deg })
+        });
+        posed.collect()
+    }
+}
+
+/// A camera that is not offered, and why.
+#[derive(Clone, Debug, PartialEq)]
+struct RefusedCamera {
+    /// Where the camera comes from, as in `seed 3`; none where no camera can be drawn in the room at all.
+    pub(super) origin: Option<String>,
+    pub(super) why: CameraRefusal,
+}
+
+/// The rule that a camera breaks.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+enum CameraRefusal {
+    /// No camera could be drawn.
+    #[error(transparent)]
+    Sampler(#[from] CameraError),
+    /// Too many pixels of the five views see the outside.
+    #[error("{:.0} % of the pixels see the outside, expected at most {:.0} %", 100.0 * share, 100.0 * most)]
+    SeesOutside {
+        share: f64,
+        /// The largest share that the rules allow.
+        most: f64,
+    },
+    #[error("it sees {seen} pieces of furniture, expected at least {least}")]
+    SeesTooLittle {
+        /// Number of pieces that it sees.
+        seen: usize,
+        /// The smallest number that the rules allow.
+        least: usize,
+    },
+    /// A surface is too near in one of the five views.
+    #[error("a surface is {nearest_m:.1e} m away, expected at least {least_m} m")]
+    TooNear {
+        /// Distance to the nearest surface, in metres.
+        nearest_m: f64,
+        /// The smallest distance that the rules allow, in metres.
+        least_m: f64,
+    },
+}
+
+impl std::fmt::Display for RefusedCamera {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.origin {
+            Some(origin) => write!(f, "{origin}: {}", self.why),
+            None => write!(f, "{}", self.why),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -5,45 +5,33 @@
 //! input. Rooms and cameras depend on the houses and the seed alone, whether all houses are searched at once, by a run that
 //! was resumed, or by several processes.
 //!
-//! Between: `paths` finds the houses and `house_part` searches each of them or takes what an earlier run has found there:
-//! [`rules`] state what a room must be like, [`intersect`] measures furniture that stands in other furniture as
-//! `solid` bodies, `posed` and `candidates` place cameras and look through them. `survey_folder` holds what was found. Then
-//! `merge` puts the survey together, [`selection`] chooses scenes, `recipe_text` and `page` write.
+//! Between: here the houses are found. `house` searches each of them or takes what an earlier run has found there:
+//! [`rules`] state what a room must be like, [`intersect`] measures furniture that stands in other furniture,
+//! `candidates` places cameras and looks through them. [`selection`] chooses scenes, and `output` writes the survey.
 
-mod camera_refusal;
 mod candidates;
-mod house_part;
+mod house;
 pub mod intersect;
-mod intersecting_pair;
-mod merge;
-mod options;
-mod page;
-mod paths;
-mod posed;
-mod recipe_text;
+mod output;
 pub mod rules;
 pub mod selection;
-#[cfg(test)]
-mod shapes;
-mod solid;
 mod survey_file;
-mod survey_folder;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use mateval_scene::{Progress, Report};
+use mateval_sources::below::{common_folder, relative_below};
 
 use crate::error::PrepError;
-use house_part::{HouseSearch, shown};
-pub use intersecting_pair::IntersectingPair;
-pub use options::SurveyOptions;
+use house::{HouseName, HouseSearch, SurveyFolder, shown};
+use output::merge;
+pub use rules::SurveyOptions;
 pub use survey_file::{
-    CandidateCamera, Choice, ChosenType, SURVEY, SURVEY_FORMAT, Selection, SurveyFile, SurveyedHouse, SurveyedRoom,
+    CandidateCamera, Choice, ChosenType, IntersectingPair, Selection, SurveyFile, SurveyedHouse, SurveyedRoom,
     TargetedMean,
 };
-use survey_folder::{HouseName, SurveyFolder};
 
-/// The result of a survey.
 #[derive(Clone, Debug)]
 pub struct Surveyed {
     /// What was written as `survey.json`; none where only some houses were to be searched.
@@ -56,15 +44,15 @@ pub struct Surveyed {
     pub kept: usize,
 }
 
-/// Searches the houses and, unless only some of them were to be searched, writes the survey, its page and its recipe. Houses
-/// that an earlier run has searched with the same settings and files are kept. A house that cannot be read is recorded in
-/// the survey and does not stop it.
+/// Searches the houses and, unless only some of them were to be searched, writes the survey, its page and its recipe.
+/// Houses that an earlier run has searched with the same settings and files are kept. A house that cannot be read is
+/// recorded in the survey and does not stop it.
 pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<Surveyed, PrepError> {
-    paths::check_folders(options)?;
-    let source = paths::source_folder(options)?;
-    let options = &paths::relative_to(&source, options)?;
-    let houses = paths::house_files(options, &source)?;
-    let wanted = paths::chosen(&houses, &options.only)?;
+    check_folders(options)?;
+    let source = source_folder(options)?;
+    let options = &relative_to(&source, options)?;
+    let houses = house_files(options, &source)?;
+    let wanted = chosen(&houses, &options.only)?;
     let folder = SurveyFolder::begin(&options.out, options.force)?;
     let is_whole = options.only.is_empty();
     let whole = is_whole.then(|| folder.lease_of_whole()).transpose()?;
@@ -77,7 +65,7 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
         progress(Report::part(&format!("house {}", house.display()), at, wanted.len()));
         kept += usize::from(if is_whole { search.find(house)? } else { search_apart(&mut search, house)? });
     }
-    let file = whole.map(|_lease| merge::merge(options, &folder, &houses, tool)).transpose()?;
+    let file = whole.map(|_lease| merge(options, &folder, &houses, tool)).transpose()?;
     Ok(Surveyed { file, source, houses: wanted.len(), kept })
 }
 
@@ -86,4 +74,105 @@ fn search_apart(search: &mut HouseSearch<'_>, house: &Path) -> Result<bool, Prep
     let _lease = search.folder.lease_of_house(&HouseName::new(&shown(house)))?;
     search.folder.reopen(search.options.force)?;
     search.find(house)
+}
+
+const HERE: &str = ".";
+
+/// Checks that everything that all houses need exists; otherwise each of them would report the same fault.
+fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
+    let source = options.source.as_deref().unwrap_or(Path::new(HERE));
+    let folders = [Some(&options.models), options.textures.as_ref()].into_iter().flatten();
+    let missing_folder = folders.map(|path| source.join(path)).find(|path| !path.is_dir());
+    let files = options.cameras.iter().chain(&options.houses).map(|path| source.join(path));
+    let missing = missing_folder.or_else(|| files.into_iter().find(|path| !path.exists()));
+    let why = "does not exist; correct the path, or name its folder with --source";
+    missing.map_or(Ok(()), |path| Err(PrepError::unusable(path, why)))
+}
+
+/// The folder that all paths become relative to.
+pub(super) fn source_folder(options: &SurveyOptions) -> Result<PathBuf, PrepError> {
+    if let Some(source) = &options.source {
+        return Ok(source.clone());
+    }
+    if given_paths(options).all(|path| relative_below(path, Path::new(HERE)).is_ok()) {
+        return Ok(HERE.into());
+    }
+    let why = "has no folder in common with the other paths; put them into one and name it with --source";
+    common_folder(given_paths(options).map(PathBuf::as_path)).ok_or_else(|| PrepError::unusable(&options.models, why))
+}
+
+fn given_paths(options: &SurveyOptions) -> impl Iterator<Item = &PathBuf> {
+    options.houses.iter().chain([&options.models]).chain(&options.textures).chain(&options.cameras)
+}
+
+/// The options with all paths relative to `source`. These paths are written to the survey and its recipe, and end up in
+/// what is built from that.
+fn relative_to(source: &Path, options: &SurveyOptions) -> Result<SurveyOptions, PrepError> {
+    let relative = |path: &PathBuf| {
+        let chosen = options.source.is_none() && source != Path::new(HERE);
+        let path = if chosen { std::path::absolute(path).map_err(PrepError::io("find", path))? } else { path.clone() };
+        Ok::<_, PrepError>(relative_below(&path, source)?)
+    };
+    Ok(SurveyOptions {
+        houses: options.houses.iter().map(relative).collect::<Result<_, _>>()?,
+        models: relative(&options.models)?,
+        textures: options.textures.as_ref().map(relative).transpose()?,
+        cameras: options.cameras.as_ref().map(relative).transpose()?,
+        ..options.clone()
+    })
+}
+
+/// The house files that were given, and all JSON files of the folders that were given: each once, sorted within its
+/// folder, relative to the source's folder.
+pub(super) fn house_files(options: &SurveyOptions, source: &Path) -> Result<Vec<PathBuf>, PrepError> {
+    let mut files = Vec::new();
+    for path in &options.houses {
+        let at = source.join(path);
+        if !at.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(&at).map_err(PrepError::io("list", &at))?;
+        let mut names = Vec::new();
+        for entry in entries {
+            names.push(path.join(entry.map_err(PrepError::io("list", &at))?.file_name()));
+        }
+        names.retain(|name| name.extension().is_some_and(|e| e == "json"));
+        names.sort();
+        files.extend(names);
+    }
+    let mut seen = BTreeSet::new();
+    files.retain(|file| seen.insert(source.join(file).canonicalize().ok().unwrap_or_else(|| file.clone())));
+    match files.is_empty() {
+        true => Err(PrepError::unusable(source, "contains no house; expected JSON files of 3D-FRONT")),
+        false => Ok(files),
+    }
+}
+
+/// The houses that `only` names, or all where it names none. Fails where a name is no house's.
+pub(super) fn chosen(houses: &[PathBuf], only: &[String]) -> Result<Vec<PathBuf>, PrepError> {
+    let is_named = |house: &Path, name: &str| {
+        house == Path::new(name) || house.file_stem().is_some_and(|stem| stem.to_string_lossy() == name)
+    };
+    let is_unknown = |name: &&String| !houses.iter().any(|house| is_named(house, name));
+    if let Some(unknown) = only.iter().find(is_unknown) {
+        return Err(PrepError::UnknownHouse { name: unknown.clone(), houses: houses.len() });
+    }
+    let is_chosen = |house: &&PathBuf| only.is_empty() || only.iter().any(|name| is_named(house, name));
+    Ok(houses.iter().filter(is_chosen).cloned().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn houses_are_named_by_path_or_stem() {
+        let houses = ["a/x.json", "b/y.json"].map(PathBuf::from);
+        let of = |only: &[&str]| chosen(&houses, &only.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+        assert_eq!(of(&[]).unwrap(), houses);
+        assert_eq!(of(&["y"]).unwrap(), [PathBuf::from("b/y.json")]);
+        assert_eq!(of(&["b/y.json", "x"]).unwrap(), houses);
+        assert!(of(&["x", "z"]).unwrap_err().to_string().contains("'z'"));
+    }
 }

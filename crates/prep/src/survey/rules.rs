@@ -1,14 +1,68 @@
-//! Which rooms become scenes: limits in a TOML file, and lists of rooms, houses and models that are known to be bad.
+//! What a survey is asked for, and which rooms become scenes.
+//!
+//! The conditions are limits in a TOML file, and lists of rooms, houses and models that are known to be bad.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mateval_image::limits::read_at_most;
+use mateval_scene::manifest;
+use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
-use super::intersecting_pair::IntersectingPair;
+use super::selection::SelectionGoal;
+use super::survey_file::{IntersectingPair, Rejection, SURVEY_FORMAT};
 use crate::error::PrepError;
 use crate::recipe::read_text;
+
+#[derive(Clone, Debug)]
+pub struct SurveyOptions {
+    /// Folder that all paths are relative to, as in a recipe. Where absent it is the current folder or, if a path is
+    /// absolute, the lowest folder that contains all of them.
+    pub source: Option<PathBuf>,
+    /// House files, or folders of house files.
+    pub houses: Vec<PathBuf>,
+    /// Folder of the 3D-FUTURE models.
+    pub models: PathBuf,
+    /// Folder of the textures of the architecture.
+    pub textures: Option<PathBuf>,
+    /// File of the designers' cameras that comes with the houses.
+    pub cameras: Option<PathBuf>,
+    /// Conditions that a room must meet.
+    pub rules: SelectionRules,
+    /// Rooms, houses and models that are known to be bad.
+    pub lists: RejectionLists,
+    /// The rules that drawn cameras keep.
+    pub camera_rules: CameraRules,
+    /// Seed of the drawn cameras.
+    pub seed: u64,
+    /// Number of cameras of each room; on average, where the camera rules go by floor area.
+    pub cameras_per_room: u32,
+    /// Width and height of the scenes' pictures, in pixels.
+    pub resolution: [u32; 2],
+    /// Vertical field of view of the drawn cameras, in degrees.
+    pub fov_y_deg: f64,
+    /// Survey these houses only, and leave the survey of all to a later run without any; each is a house's file, relative
+    /// to the source's folder, or the file's name without `.json`.
+    pub only: Vec<String>,
+    /// The scenes to choose; every accepted room where absent.
+    pub goal: Option<SelectionGoal>,
+    pub out: PathBuf,
+    /// Replace a survey that already exists.
+    pub force: bool,
+}
+
+impl SurveyOptions {
+    /// The hash of everything but files that decides what is found in a house, and of the tool that searches.
+    pub(super) fn sha256(&self, tool: &str) -> String {
+        // Every setting is printed with all its fields. The text is read by nobody, and the tool's version stands in it.
+        let Self { source: _, houses: _, models, textures, cameras, rules, lists, .. } = self;
+        let Self { camera_rules, seed, cameras_per_room, resolution, fov_y_deg, only: _, goal: _, .. } = self;
+        let files = format!("{models:?}\n{textures:?}\n{cameras:?}\n{rules:?}\n{lists:?}");
+        let cameras = format!("{camera_rules}\n{seed}\n{cameras_per_room}\n{resolution:?}\n{fov_y_deg:?}");
+        manifest::sha256_of_bytes(format!("{tool}\n{SURVEY_FORMAT}\n{files}\n{cameras}").as_bytes())
+    }
+}
 
 /// Conditions that a room must meet. Every key of the file is optional.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -20,7 +74,6 @@ pub struct SelectionRules {
     pub min_objects: usize,
     /// Largest number of pieces of furniture placed.
     pub max_objects: usize,
-    /// Smallest number of different super-categories.
     pub min_super_categories: usize,
     /// Longest sides of the bounding box of the floor, in metres.
     pub max_size_m: [f64; 2],
@@ -59,22 +112,6 @@ impl Default for SelectionRules {
             min_seen_objects: 2,
             min_nearest_m: 0.01,
         }
-    }
-}
-
-/// A rule that a room breaks.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Rejection {
-    /// The key of the rule, `listed` or `no_camera`.
-    pub rule: String,
-    /// What was expected and what was found.
-    pub reason: String,
-}
-
-impl Rejection {
-    pub(super) fn new(rule: &str, reason: impl Into<String>) -> Self {
-        Self { rule: rule.to_owned(), reason: reason.into() }
     }
 }
 

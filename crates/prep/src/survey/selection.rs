@@ -1,10 +1,10 @@
 //! Chooses scenes among the accepted rooms, so that together they are like the paper's.
 //!
 //! Rooms are ranked by the score of their best camera. Then one room after another is chosen: each time the one that
-//! brings the chosen scenes nearest to the goal, of equally near ones the one with the better rank. How far they are from it
-//! is the sum of three terms: the squares of the relative errors of the mean numbers of objects and of super-categories,
-//! and for every room type the square of the difference between its share and an equal share. A house gives a limited
-//! number of scenes.
+//! brings the chosen scenes nearest to the goal, of equally near ones the one with the better rank. How far they are
+//! from it is the sum of three terms: the squares of the relative errors of the mean numbers of objects and of
+//! super-categories, and for every room type the square of the difference between its share and an equal share. A house
+//! gives a limited number of scenes.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,6 @@ use super::survey_file::{Choice, ChosenType, Selection, SurveyedHouse, SurveyedR
 /// What the chosen scenes are to be like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelectionGoal {
-    /// Number of scenes.
     pub scenes: usize,
     /// The most scenes of one house.
     pub per_house: usize,
@@ -30,7 +29,6 @@ impl SelectionGoal {
     }
 }
 
-/// An accepted room.
 #[derive(Clone, Debug)]
 struct Candidate {
     /// Index of the house, and of the room in it.
@@ -201,7 +199,8 @@ impl Chosen {
 
 #[cfg(test)]
 mod tests {
-    use super::super::survey_file::CandidateCamera;
+    use crate::survey::survey_file::CandidateCamera;
+
     use super::*;
 
     fn room(house: usize, room_type: &str, [objects, super_categories]: [usize; 2], score: f64) -> SurveyedRoom {

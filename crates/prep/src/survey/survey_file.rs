@@ -4,9 +4,6 @@ use mateval_scene::FindingCount;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::intersecting_pair::IntersectingPair;
-use super::rules::Rejection;
-
 /// The value of `format` in this version of the file.
 pub const SURVEY_FORMAT: &str = "mateval-survey/2";
 
@@ -155,4 +152,39 @@ pub struct CandidateCamera {
     pub seen_objects: usize,
     /// The file of its picture, relative to `survey.json`.
     pub thumbnail: String,
+}
+
+/// Two pieces of furniture that intersect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IntersectingPair {
+    /// Their names.
+    pub pieces: [String; 2],
+    /// The shortest way that separates them, in metres, at most 0.5.
+    pub depth_m: f64,
+    /// The part of the smaller one's volume that lies in the other, 0 to 1.
+    pub volume_share: f64,
+}
+
+impl std::fmt::Display for IntersectingPair {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [a, b] = &self.pieces;
+        write!(f, "'{a}' in '{b}' ({:.3} m, {:.1} %)", self.depth_m, 100.0 * self.volume_share)
+    }
+}
+
+/// A rule that a room breaks.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rejection {
+    /// The key of the rule, `listed` or `no_camera`.
+    pub rule: String,
+    /// What was expected and what was found.
+    pub reason: String,
+}
+
+impl Rejection {
+    pub(super) fn new(rule: &str, reason: impl Into<String>) -> Self {
+        Self { rule: rule.to_owned(), reason: reason.into() }
+    }
 }

@@ -1,22 +1,132 @@
-//! Refuses scenes that would be built into a wrong truth: much of the source is missing, base colours are not stated, or no
-//! light reaches the picture. The recipe may allow the first two.
+//! Writes the pictures of every view of a scene, and refuses scenes that would be built into a wrong truth.
+//!
+//! These are scenes in which much of the source is missing, base colours are not stated, or no light reaches the picture.
+//! The recipe may allow the first two.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::png_io;
 use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::{Finding, Severity};
+use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
+use mateval_scene::{Finding, Progress, Report, SceneId, Severity, ViewId};
 use mateval_sources::source_scene::Missing;
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
 use super::fault::{SceneFault, above_notes};
 use super::plan::Plan;
-use super::view_pictures::Seen;
+use super::source::MOST_UNSTATED;
 use crate::error::PrepError;
 use crate::recipe::RecipeScene;
+use crate::views::{
+    GeometryPictures, TruthPictures, ViewScene, note_nearest, unseen_share, write_geometry, write_parts,
+};
 
-/// A larger share of the valid pixels of the input view without a stated base colour refuses the scene.
-pub(super) const MOST_UNSTATED: f64 = 0.05;
+/// What the pictures of all views show.
+#[derive(Default)]
+pub(super) struct Seen {
+    /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
+    pub(super) nearest: Vec<Option<f64>>,
+    /// The share of the valid pixels of each view that the input view does not show.
+    pub(super) unseen_shares: Vec<f64>,
+    /// For each instance, how many valid pixels of the input view show it.
+    input_pixels: Vec<usize>,
+    /// Findings about views that are of little use.
+    pub(super) findings: Vec<Finding>,
+}
+
+impl Seen {
+    /// Fails if the input view shows nothing that is scored.
+    pub(super) fn or_refuse(self, scene: &SceneId, plan: &Plan) -> Result<Self, PrepError> {
+        if self.input_pixels.iter().any(|count| *count > 0) {
+            return Ok(self);
+        }
+        Err(PrepError::scene(scene)(SceneFault::NothingSeen { findings: above_notes(&plan.findings) }))
+    }
+}
+
+/// A surface that is nearer than this, in metres, fills the picture with a few texels; one that contains the camera
+/// fills it with noise.
+const TOO_NEAR_M: f64 = 0.001;
+
+/// Writes the pictures of every view. `scored` states for each instance whether it has an atlas.
+pub(super) fn write_pictures(
+    plan: &Plan,
+    folder: &SceneFolder,
+    scored: &[bool],
+    progress: Progress<'_>,
+) -> Result<Seen, PrepError> {
+    let world = World::new(plan.scene.clone())?;
+    let instances: Vec<u16> = plan.instances.iter().map(|entry| entry.index.0.get()).collect();
+    let parts: Vec<(String, Vec<Vec<u16>>)> =
+        plan.part_splits.iter().map(|split| (part_picture(split.id.as_ref()), split.values())).collect();
+    let scene = ViewScene::new(&plan.scene, &world, &instances, scored);
+    let mut seen = Seen::default();
+    let mut in_input = vec![None; plan.instances.len()];
+    let mut elsewhere = vec![None; plan.instances.len()];
+    for (at, view) in plan.views.iter().enumerate() {
+        progress(Report::step("views", at, plan.views.len()));
+        let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
+        note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
+        check_use(plan, &view.id, &geometry, &mut seen);
+        if at == 0 {
+            seen.input_pixels = valid_pixels(&geometry, plan.instances.len());
+        }
+        seen.unseen_shares.push(unseen_share(&geometry));
+        write_geometry(folder, &view.id, &geometry)?;
+        write_truth(folder, &view.id, &truth)?;
+        write_parts(&folder.view(&view.id), &geometry, &parts)?;
+    }
+    progress(Report::step("views", plan.views.len(), plan.views.len()));
+    seen.nearest = in_input.into_iter().zip(elsewhere).map(|(first, other)| first.or(other)).collect();
+    Ok(seen)
+}
+
+/// Adds a finding where a view is of little use: no pixel is valid, or a surface is too near to the camera.
+fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut Seen) {
+    let mut warn = |code: &str, message: String, action: &str| {
+        seen.findings.push(Finding {
+            severity: Severity::Warning,
+            code: code.to_owned(),
+            file: plan.file.clone(),
+            place: format!("view '{view}'"),
+            message,
+            action: action.to_owned(),
+        });
+    };
+    let nearest = geometry.depth.pixels().iter().copied().filter(|depth| *depth > 0.0).reduce(f32::min);
+    if let Some(nearest) = nearest.filter(|nearest| f64::from(*nearest) < TOO_NEAR_M) {
+        let message = format!("a surface is {nearest:.1e} m in front of the camera, expected {TOO_NEAR_M} m or more");
+        warn("camera_too_near", message, "kept the view; choose another camera, since so near a surface may be noise");
+    }
+    if view.as_str() != INPUT && !geometry.valid.pixels().contains(&true) {
+        let message = "the camera sees nothing that is scored: no pixel is valid".to_owned();
+        warn("nothing_seen", message, "kept the view; it adds nothing to any score");
+    }
+}
+
+/// For each instance, how many valid pixels show it.
+fn valid_pixels(geometry: &GeometryPictures, instances: usize) -> Vec<usize> {
+    let mut count = vec![0; instances];
+    for (instance, _) in geometry.instance.pixels().iter().zip(geometry.valid.pixels()).filter(|(_, valid)| **valid) {
+        if let Some(place) = usize::from(*instance).checked_sub(1) {
+            count[place] += 1;
+        }
+    }
+    count
+}
+
+fn write_truth(folder: &SceneFolder, view: &ViewId, truth: &TruthPictures) -> Result<(), PrepError> {
+    let hidden = folder.truth_view(view);
+    exr_io::write_linear(&hidden.join("albedo.exr"), &truth.albedo, Precision::Float)?;
+    exr_io::write_linear(&hidden.join("diffuse_albedo.exr"), &truth.diffuse_albedo, Precision::Float)?;
+    exr_io::write_scalar(&hidden.join("roughness.exr"), &truth.roughness, Precision::Float)?;
+    exr_io::write_scalar(&hidden.join("metallic.exr"), &truth.metallic, Precision::Float)?;
+    png_io::write_mask(&hidden.join("specular_region.png"), &truth.specular_region)?;
+    Ok(())
+}
+
 /// A larger share of missing files or pieces is a warning.
 const FEW_MISSING: f64 = 0.05;
 /// A larger share of missing files or pieces refuses the scene.
@@ -31,7 +141,7 @@ const LIGHT_SAMPLES: [u32; 2] = [4, 128];
 const MOST_FOLDERS: usize = 2000;
 
 /// The finding about missing files, if any are missing. Fails where too many are.
-pub(super) fn missing(
+pub(super) fn check_missing(
     entry: &RecipeScene,
     missing: &Missing,
     root: &Path,
@@ -99,7 +209,7 @@ fn folders_below(root: &Path) -> Vec<PathBuf> {
 }
 
 /// The finding about base colours that are not stated, if any are. Fails where they cover too much of the picture.
-pub(super) fn unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, SceneFault> {
+pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, SceneFault> {
     let all: usize = seen.input_pixels.iter().sum();
     let is_unstated = |at: &usize| !plan.stated[*at].base_color && seen.input_pixels[*at] > 0;
     let mut unstated: Vec<usize> = (0..plan.instances.len()).filter(is_unstated).collect();

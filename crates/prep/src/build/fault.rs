@@ -1,11 +1,11 @@
 //! The faults for which a scene of a recipe is refused while it is made.
 
+use mateval_image::ImageError;
+use mateval_scene::source_folder::FileFault;
 use mateval_scene::{Finding, Severity};
 use mateval_sources::front3d::camera_sampler::CameraError;
 
-pub use super::photo::PhotoFault;
-use crate::numbering::TooMany;
-use crate::part_labels::LabelFault;
+use super::parts::{LabelFault, TooMany};
 use crate::recipe::fault::RecipeSceneFault;
 
 /// Why a scene cannot be made.
@@ -14,7 +14,6 @@ pub enum SceneFault {
     /// The recipe's entry of the scene is not valid.
     #[error(transparent)]
     Recipe(#[from] RecipeSceneFault),
-    /// The source has no usable surface.
     #[error("the source has no surface that could be read{}", causes(findings))]
     NoSurfaces {
         /// Everything that was wrong with the source.
@@ -23,13 +22,8 @@ pub enum SceneFault {
     /// The scene has more instances or parts than pictures can hold.
     #[error(transparent)]
     TooMany(#[from] TooMany),
-    /// Files differ from those that the recipe pins.
     #[error("its files differ from the recipe's `inputs`: {}", joined(faults))]
-    Pins {
-        /// Each file that differs.
-        faults: Vec<PinFault>,
-    },
-    /// Labels of parts do not fit the scene.
+    Pins { faults: Vec<PinFault> },
     #[error("{}", joined(faults))]
     Labels {
         /// Each file that does not fit.
@@ -38,7 +32,6 @@ pub enum SceneFault {
     /// The Blender file cannot be read.
     #[error(transparent)]
     Bake(#[from] BakeFault),
-    /// The photo cannot be the input picture.
     #[error("photo: {0}")]
     Photo(PhotoFault),
     /// The input view shows no instance that has an atlas.
@@ -46,24 +39,17 @@ pub enum SceneFault {
         "the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera{}",
         causes(findings)
     )]
-    NothingSeen {
-        /// What was found before.
-        findings: Vec<Finding>,
-    },
-    /// Much of the source is missing.
+    NothingSeen { findings: Vec<Finding> },
     #[error(
         "{message}; at most {:.0} % may be missing, unless the recipe's scene has `allow_missing = true`{}",
         100.0 * most, causes(findings)
     )]
     Missing {
-        /// What is missing.
         message: String,
         /// The largest share that may be missing.
         most: f64,
-        /// What was found before.
         findings: Vec<Finding>,
     },
-    /// Base colours are defaults of the format.
     #[error(
         "{message}; at most {:.0} % may be unstated. Give the materials a colour or a texture (bake procedural ones); \
          or, where the exporter leaves out a white that is meant, write `allow_unstated = true` for the scene in the \
@@ -71,14 +57,11 @@ pub enum SceneFault {
         100.0 * most, causes(findings)
     )]
     Unstated {
-        /// What is not stated.
         message: String,
         /// The largest share that may be unstated.
         most: f64,
-        /// What was found before.
         findings: Vec<Finding>,
     },
-    /// The picture would be black.
     #[error(
         "none of the scene's {lights} lights reaches the input view: its picture would be black; add a light, or state a \
          photo{}",
@@ -87,21 +70,10 @@ pub enum SceneFault {
     NoLight {
         /// Groups of lights.
         lights: usize,
-        /// What was found before.
         findings: Vec<Finding>,
     },
-    /// The source's picture size is out of range.
     #[error("the source's film is {width}x{height}; state a resolution of {least} to {most} a side in the recipe")]
-    FilmSize {
-        /// Pixels.
-        width: u32,
-        /// Pixels.
-        height: u32,
-        /// Least pixels of a side.
-        least: u32,
-        /// Most pixels of a side.
-        most: u32,
-    },
+    FilmSize { width: u32, height: u32, least: u32, most: u32 },
     /// A camera by position and target looks nowhere, or straight up or down.
     #[error("camera: position and target must differ, and not only in height")]
     CameraDirection,
@@ -111,18 +83,10 @@ pub enum SceneFault {
          `camera = {{ position = [4.0, 1.5, 3.0], target = [1.0, 0.8, 0.5], fov_y_deg = 50 }}`"
     )]
     NoCameraInFile,
-    /// The house has no such room.
     #[error("the house has no room '{room}'; it has '{}'", rooms.join("', '"))]
-    NoRoom {
-        /// The room in the recipe.
-        room: String,
-        /// The rooms of the house.
-        rooms: Vec<String>,
-    },
-    /// The house has no designer's camera with this number.
+    NoRoom { room: String, rooms: Vec<String> },
     #[error("the house has no designer's camera {number}; it has {}", listed(known))]
     NoDesignersCamera {
-        /// The number in the recipe.
         number: usize,
         /// The numbers of the house's cameras.
         known: Vec<usize>,
@@ -135,49 +99,49 @@ pub enum SceneFault {
 /// Why a `.blend` file was not baked.
 #[derive(Debug, thiserror::Error)]
 pub enum BakeFault {
-    /// No Blender was found.
     #[error(
         "a .blend file is read by Blender, and none was found; install it with `mateval fetch blender`, or name it with --blender"
     )]
     NoBlender,
-    /// The file is refused.
     #[error("the .blend file is refused:{}", Finding::list(.0))]
     Refused(Vec<Finding>),
-    /// Blender failed.
     #[error("Blender did not bake the file: {what}; its log ends with:\n{log}")]
-    Failed {
-        /// What happened.
-        what: String,
-        /// The end of its log.
-        log: String,
+    Failed { what: String, log: String },
+}
+
+/// Why a photo cannot be the input picture.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotoFault {
+    /// The file lies outside the folder, cannot be read or is too large.
+    #[error(transparent)]
+    File(#[from] FileFault),
+    /// The file is not a valid photo.
+    #[error(transparent)]
+    Picture(#[from] ImageError),
+    /// The photo shows more or less than the camera, or is smaller than its picture.
+    #[error(
+        "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; \
+         crop the photo, or state another `resolution`",
+        found[0], found[1], expected[0], expected[1]
+    )]
+    Size {
+        file: String,
+        /// Columns and rows of the photo.
+        found: [u32; 2],
+        /// Columns and rows of the camera's picture.
+        expected: [u32; 2],
     },
 }
 
 /// A file that differs from those that the recipe pins.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PinFault {
-    /// The file has other bytes.
     #[error("'{file}' has the hash {found}, expected {pinned}")]
-    Changed {
-        /// The file.
-        file: String,
-        /// Its SHA-256.
-        found: String,
-        /// The SHA-256 in the recipe.
-        pinned: String,
-    },
-    /// The file was read but is not pinned.
+    Changed { file: String, found: String, pinned: String },
     #[error("'{file}' was read but is not in `inputs`")]
-    Unlisted {
-        /// The file.
-        file: String,
-    },
-    /// The file is pinned but was not read.
+    Unlisted { file: String },
     #[error("'{file}' is in `inputs` but was not read")]
-    Unread {
-        /// The file.
-        file: String,
-    },
+    Unread { file: String },
 }
 
 /// The findings that may be the cause of a fault.

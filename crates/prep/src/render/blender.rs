@@ -15,9 +15,7 @@ use mateval_scene::render_file::RenderFile;
 use mateval_scene::render_noise::RenderNoise;
 use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference_io};
 
-use super::render_run::{MAX_BOUNCES, RenderRun, seed, seed_texts};
-use super::report::RenderReport;
-use super::store::{self, ViewRender};
+use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
 use crate::blender::{
     BlenderEvent, BlenderLimits, BlenderProgram, BlenderResult, BlenderView, JobFolder, JobPlan, JobView, tail,
 };
@@ -32,12 +30,9 @@ const TAIL_BYTES: u64 = 1500;
 /// Cycles takes seeds below this number.
 const SEEDS: u64 = 1 << 31;
 
-/// How Blender is run.
 #[derive(Clone, Debug)]
 pub struct BlenderOptions {
-    /// The program to run.
     pub program: BlenderProgram,
-    /// Limits of one run.
     pub limits: BlenderLimits,
     /// Number of scenes rendered at once.
     pub jobs: usize,
@@ -242,7 +237,7 @@ impl BlenderScene<'_> {
             approximations: result.approximations.clone(),
         };
         let render = ViewRender { halves: [a, b], shown: &pictures.denoised, passes: Some(pictures) };
-        store::write(&folder.render(&self.run.renderer, &view.id), &render, scene.exposure, &file)
+        write_view(&folder.render(&self.run.renderer, &view.id), &render, scene.exposure, &file)
     }
 
     fn finding(&self, failure: Failure) -> Finding {
@@ -264,10 +259,8 @@ impl BlenderScene<'_> {
     }
 }
 
-/// Why an attempt failed.
 struct Failure {
     what: String,
-    /// The end of the log.
     log: String,
     /// The command that repeats the attempt.
     repeat: String,

@@ -1,0 +1,382 @@
+//! The files that are given for a release's report, each of which must be about its dataset.
+//!
+//! These are the verdicts of `prep compare`, whether two renderers agree on a scene; and the results that give the ceiling
+//! and the floor, the scores of the truth itself and of a constant estimate.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use mateval_audit::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, State};
+use mateval_eval::EvalError;
+use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_eval::result_key::ResultKey;
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::open::Dataset;
+use mateval_scene::{Finding, SceneError, SceneId, Severity, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Why a release could not be described.
+#[derive(Debug, thiserror::Error)]
+pub enum ReleaseError {
+    /// Files that were given are not about this dataset, or are something else: every reason. Correct them, or leave them
+    /// out.
+    #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
+    UnfitFiles(Vec<Finding>),
+    #[error(
+        "'{}' holds no .json file; expected what `mateval prep compare --out` or `--format json` writes, in the folder \
+         or directly below it",
+        folder.display()
+    )]
+    NoVerdicts { folder: PathBuf },
+    /// A folder that is not the report of a release would be replaced: choose another one.
+    #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
+    NotAReport { path: PathBuf },
+    /// The report would lie in the dataset: choose another place.
+    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
+    OutputInDataset { path: PathBuf },
+    /// The dataset, or a file of it, could not be read or written.
+    #[error(transparent)]
+    Dataset(#[from] mateval_scene::SceneError),
+    /// The dataset could not be examined.
+    #[error(transparent)]
+    Audit(#[from] mateval_audit::AuditError),
+    /// A result could not be checked.
+    #[error(transparent)]
+    Eval(#[from] mateval_eval::EvalError),
+    /// The recipe could not be read.
+    #[error(transparent)]
+    Prep(#[from] mateval_prep::PrepError),
+    /// A picture could not be read or written.
+    #[error(transparent)]
+    Image(#[from] mateval_image::ImageError),
+}
+
+/// All states, in the order in which they are counted.
+const STATES: [State; 6] =
+    [State::Agrees, State::Differs, State::TooNoisy, State::Undecided, State::Missing, State::Unreadable];
+
+/// Whether two renderers agree on a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneVerdict {
+    /// The program that compared and its version.
+    pub tool: String,
+    /// Whether every check of every view agrees.
+    pub agrees: bool,
+    /// The number of checks in each state that occurs.
+    pub checks: Vec<StateCount>,
+    /// One line for every check that does not agree; null where the ground truth is withheld, since the lines state
+    /// measurements of it.
+    pub faults: Option<Vec<String>>,
+}
+
+/// The number of checks in one state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StateCount {
+    /// The state.
+    pub state: State,
+    /// The number of checks.
+    pub checks: usize,
+}
+
+impl SceneVerdict {
+    fn new(file: &CompareFile, scene: &SceneComparison) -> Self {
+        let checks = || scene.views.iter().flat_map(|view| view.checks.iter().map(move |check| (&view.view, check)));
+        let count = |state: State| StateCount { state, checks: checks().filter(|(_, c)| c.state == state).count() };
+        let faults = checks().filter(|(_, check)| check.state != State::Agrees);
+        Self {
+            tool: file.tool.clone(),
+            agrees: agrees(scene),
+            checks: STATES.map(count).into_iter().filter(|count| count.checks > 0).collect(),
+            faults: Some(faults.map(|(view, check)| format!("{view}: {check}")).collect()),
+        }
+    }
+
+    pub fn total(&self) -> usize {
+        self.checks.iter().map(|count| count.checks).sum()
+    }
+}
+
+fn agrees(scene: &SceneComparison) -> bool {
+    let mut checks = scene.views.iter().flat_map(|view| &view.checks).peekable();
+    checks.peek().is_some() && checks.all(|check| check.state == State::Agrees)
+}
+
+/// Reads verdicts from files, and from the `.json` files of folders and of the folders directly below. Fails with every
+/// reason for which one of them does not fit: it is something else, is about another dataset or a part of a scene, or
+/// repeats a scene.
+pub fn read_comparisons(paths: &[PathBuf], dataset: &Dataset) -> Result<BTreeMap<SceneId, SceneVerdict>, ReleaseError> {
+    let mut findings = Vec::new();
+    let mut verdicts: BTreeMap<SceneId, (PathBuf, SceneVerdict)> = BTreeMap::new();
+    for path in json_files(paths)? {
+        let read = json::read_format::<CompareFile>(&path, COMPARE_FORMAT);
+        let Some(file) = fitting(read, "a comparison", &path, &mut findings)? else { continue };
+        if let Some(finding) = foreign(&path, &file.dataset.manifest_sha256, dataset) {
+            findings.push(finding);
+            continue;
+        }
+        findings.extend(contradiction(&path, &file));
+        for (at, scene) in file.scenes.iter().enumerate() {
+            findings.extend(incomplete(&path, at, scene, dataset));
+            if let Some((earlier, _)) = verdicts.get(&scene.scene) {
+                let message = format!("'{}' holds the scene '{}' too", earlier.display(), scene.scene);
+                findings.push(unfit(&path, &format!("/scenes/{at}/scene"), message));
+            }
+            verdicts.insert(scene.scene.clone(), (path.clone(), SceneVerdict::new(&file, scene)));
+        }
+    }
+    if !findings.is_empty() {
+        return Err(ReleaseError::UnfitFiles(findings));
+    }
+    Ok(verdicts.into_iter().map(|(scene, (_, verdict))| (scene, verdict)).collect())
+}
+
+/// A finding if the file's verdict does not follow from its checks.
+fn contradiction(path: &Path, file: &CompareFile) -> Option<Finding> {
+    let found = file.scenes.iter().all(agrees);
+    let message = || format!("states {}, but its checks give {found}", file.agrees);
+    (file.agrees != found).then(|| unfit(path, "/agrees", message()))
+}
+
+/// A finding if the dataset has no such scene, or if not each of its views was compared.
+fn incomplete(path: &Path, at: usize, found: &SceneComparison, dataset: &Dataset) -> Option<Finding> {
+    let scene: Option<&SceneFile> = dataset.scenes.iter().find(|scene| scene.id == found.scene);
+    let Some(scene) = scene else {
+        let message = format!("the dataset has no scene '{}'", found.scene);
+        return Some(unfit(path, &format!("/scenes/{at}/scene"), message));
+    };
+    let is_same = scene.views.iter().map(|view| &view.id).eq(found.views.iter().map(|view| &view.view));
+    let message = || format!("these are not the {} views of the scene '{}'", scene.views.len(), scene.id);
+    (!is_same).then(|| unfit(path, &format!("/scenes/{at}/views"), message()))
+}
+
+/// The files, sorted within each folder.
+fn json_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReleaseError> {
+    let mut all = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            all.push(path.clone());
+            continue;
+        }
+        let mut found = Vec::new();
+        for entry in entries(path)? {
+            match entry.is_dir() {
+                true => found.extend(entries(&entry)?.into_iter().filter(|file| is_json(file))),
+                false => found.extend(Some(entry).filter(|file| is_json(file))),
+            }
+        }
+        if found.is_empty() {
+            return Err(ReleaseError::NoVerdicts { folder: path.clone() });
+        }
+        all.extend(found);
+    }
+    Ok(all)
+}
+
+fn is_json(path: &Path) -> bool {
+    path.is_file() && path.extension().is_some_and(|extension| extension == "json")
+}
+
+/// The entries of a folder, sorted.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let io = || SceneError::io("list", folder);
+    let entries = std::fs::read_dir(folder).map_err(io())?;
+    let mut paths: Vec<PathBuf> =
+        entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>().map_err(io())?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// The scores of one submission.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceScores {
+    /// The program that scored and its version.
+    pub tool: String,
+    /// The name of the submission, as it states it.
+    pub method: String,
+    /// The description of the submission, as it states it.
+    pub description: String,
+    /// The protocol.
+    pub protocol: String,
+    /// The version of the scorer.
+    pub scorer_version: u32,
+    /// The hash of everything that the scores depend on.
+    pub fingerprint: String,
+    /// Number of scenes that were scored.
+    pub scenes_scored: usize,
+    /// Means over these scenes.
+    pub summary: BTreeMap<ResultKey, f64>,
+    /// Standard errors of the means of PSNR of light due to render noise, in dB.
+    pub summary_noise: BTreeMap<ResultKey, f64>,
+    /// The scores of each scene; null where the ground truth is withheld.
+    pub scenes: Option<BTreeMap<SceneId, BTreeMap<ResultKey, f64>>>,
+    /// Standard errors of the PSNR of light of each scene, in dB; null where the ground truth is withheld.
+    pub noise: Option<BTreeMap<SceneId, BTreeMap<ResultKey, f64>>>,
+}
+
+impl ReferenceScores {
+    fn new(result: &ResultFile, scores: &ProtocolResult) -> Self {
+        Self {
+            tool: result.tool.clone(),
+            method: result.method.clone(),
+            description: result.submission.description.clone(),
+            protocol: scores.protocol.name.clone(),
+            scorer_version: scores.protocol.scorer_version,
+            fingerprint: scores.fingerprint.clone(),
+            scenes_scored: result.dataset.scenes.len(),
+            summary: scores.summary.clone(),
+            summary_noise: scores.summary_noise.clone(),
+            scenes: Some(scores.scenes.clone()),
+            noise: Some(scores.noise.clone()),
+        }
+    }
+
+    /// The scores of one scene; none where it was not scored, or the ground truth is withheld.
+    pub fn of_scene(&self, scene: &SceneId) -> Option<&BTreeMap<ResultKey, f64>> {
+        self.scenes.as_ref()?.get(scene)
+    }
+}
+
+#[derive(Clone, Debug, Default)]
+pub struct Bounds {
+    /// The scores of the truth.
+    pub ceiling: Option<ReferenceScores>,
+    /// The scores of a constant estimate.
+    pub floor: Option<ReferenceScores>,
+}
+
+/// Reads the results of the ceiling and the floor under the protocol. Fails with every reason for which one of them
+/// does not fit: it is something else, was made on another dataset, contradicts its own numbers or its fingerprint, or
+/// has no scores under the protocol; or both depend on different rules.
+pub fn read_bounds(
+    ceiling: Option<&Path>,
+    floor: Option<&Path>,
+    protocol: &str,
+    dataset: &Dataset,
+) -> Result<Bounds, ReleaseError> {
+    let mut findings = Vec::new();
+    let [first, second] = [ceiling, floor].map(|path| path.map(|path| result(path, protocol, dataset, &mut findings)));
+    let (first, second) = (first.transpose()?.flatten(), second.transpose()?.flatten());
+    if let (Some(first), Some((result, scores)), Some(path)) = (&first, &second, floor)
+        && basis(&first.0, &first.1, &[]) != basis(result, scores, &[])
+    {
+        let message = "its rules, scorer or LPIPS weights are not those of the ceiling".to_owned();
+        findings.push(unfit(path, &format!("/protocols/{protocol}/fingerprint"), message));
+    }
+    if !findings.is_empty() {
+        return Err(ReleaseError::UnfitFiles(findings));
+    }
+    let scores = |read: Option<Scored>| read.map(|(result, scores)| ReferenceScores::new(&result, &scores));
+    Ok(Bounds { ceiling: scores(first), floor: scores(second) })
+}
+
+/// A result and its scores under one protocol.
+type Scored = (ResultFile, ProtocolResult);
+
+fn result(
+    path: &Path,
+    protocol: &str,
+    dataset: &Dataset,
+    findings: &mut Vec<Finding>,
+) -> Result<Option<Scored>, ReleaseError> {
+    let read = match ResultFile::read(path) {
+        Ok(result) => Ok(result),
+        Err(EvalError::Dataset(error)) => Err(error),
+        Err(EvalError::Contradiction { place, said, found, .. }) => {
+            findings.push(unfit(path, &place, format!("it states {said}, but its own numbers give {found}")));
+            return Ok(None);
+        }
+        Err(other) => return Err(other.into()),
+    };
+    let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
+    let before = findings.len();
+    findings.extend(foreign(path, &result.dataset.manifest_sha256, dataset));
+    findings.extend(unknown_scenes(path, &result, dataset));
+    let scores = result.protocols.remove(protocol);
+    match &scores {
+        Some(scores) => findings.extend(changed(path, &result, protocol, scores)),
+        None => {
+            let others: Vec<&str> = result.protocols.keys().map(String::as_str).collect();
+            let message = format!("has no scores under protocol '{protocol}', only under: {}", others.join(", "));
+            findings.push(unfit(path, "/protocols", message));
+        }
+    }
+    Ok(scores.filter(|_| findings.len() == before).map(|scores| (result, scores)))
+}
+
+/// A finding if the result lists no scene, or one that the dataset does not have or another renderer.
+fn unknown_scenes(path: &Path, result: &ResultFile, dataset: &Dataset) -> Option<Finding> {
+    let known = &dataset.file.scenes;
+    if result.dataset.photo_renderer != dataset.file.photo_renderer {
+        let message = "light was compared with the pictures of another renderer".to_owned();
+        return Some(unfit(path, "/dataset/photo_renderer", message));
+    }
+    let scenes = &result.dataset.scenes;
+    let is_part = known.iter().filter(|id| scenes.contains(id)).eq(scenes) && !scenes.is_empty();
+    let message = || "these are not scenes of the dataset in its order".to_owned();
+    (!is_part).then(|| unfit(path, "/dataset/scenes", message()))
+}
+
+/// A finding if the fingerprint does not follow from the rest of the result.
+fn changed(path: &Path, result: &ResultFile, protocol: &str, scores: &ProtocolResult) -> Option<Finding> {
+    let found = basis(result, scores, &result.dataset.scenes.iter().collect::<Vec<_>>());
+    let place = format!("/protocols/{protocol}/fingerprint");
+    let message = || format!("does not follow from protocol, dataset, scenes and weights, which give {found}");
+    (found != scores.fingerprint).then(|| unfit(path, &place, message()))
+}
+
+/// The fingerprint for these scenes; without scenes, a hash of everything else that scores depend on.
+fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
+    let weights = result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
+    scores.protocol.fingerprint(&result.dataset.manifest_sha256, scenes, weights)
+}
+
+/// What to do with a file that does not fit.
+const ACTION: &str = "make it again from this dataset, or leave it out";
+
+/// A finding about the place, a JSON pointer, of a file.
+fn unfit(path: &Path, place: &str, message: String) -> Finding {
+    Finding {
+        severity: Severity::Error,
+        code: "unfit_file".to_owned(),
+        file: path.display().to_string(),
+        place: place.to_owned(),
+        message,
+        action: ACTION.to_owned(),
+    }
+}
+
+/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends the
+/// reading.
+fn fitting<T>(
+    read: Result<T, SceneError>,
+    expected: &str,
+    path: &Path,
+    findings: &mut Vec<Finding>,
+) -> Result<Option<T>, SceneError> {
+    let (place, found) = match read {
+        Ok(value) => return Ok(Some(value)),
+        Err(SceneError::Format { found, expected, .. }) => {
+            ("/format".to_owned(), format!("the format '{found}' in place of '{expected}'"))
+        }
+        Err(SceneError::Invalid { findings: faults, .. }) => {
+            faults.into_iter().next().map(|fault| (fault.place, fault.message)).unwrap_or_default()
+        }
+        Err(other) => return Err(other),
+    };
+    findings.push(unfit(path, &place, format!("expected {expected}, found: {found}")));
+    Ok(None)
+}
+
+/// A finding if the file is about another dataset than this one; `manifest` is the hash that it states.
+pub(crate) fn foreign(path: &Path, manifest: &str, dataset: &Dataset) -> Option<Finding> {
+    let ours = &dataset.file.manifest_sha256;
+    let message = || {
+        let found = mateval_scene::findings::shortened(manifest);
+        format!("it is about the dataset with manifest '{found}', and this one has '{ours}'")
+    };
+    (manifest != ours).then(|| unfit(path, "/dataset/manifest_sha256", message()))
+}
