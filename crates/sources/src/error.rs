@@ -1,8 +1,8 @@
-//! The error type of all readers: why a source could not be read at all. Lesser faults are findings.
+//! Opens the main file of a source. A fault here means that a source could not be read at all; lesser faults are findings.
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::source_folder::FileFault;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
 
 use crate::bitterli::BitterliError;
 use crate::front3d::HouseError;
@@ -68,4 +68,20 @@ pub enum InvalidSource {
     /// The file is not a glTF scene that can be read.
     #[error(transparent)]
     Gltf(GltfSceneError),
+}
+
+/// Reads the file at `path`, which may have at most `most` bytes. Returns its folder, its name and its bytes. Other files
+/// of the folder may have at most `file_bytes`.
+pub fn open(path: &Path, most: u64, file_bytes: u64) -> Result<(SourceFolder, String, Vec<u8>), SourceError> {
+    let io = |source| SourceError::Io { path: path.to_owned(), source };
+    let invalid = |reason| SourceError::invalid(path, reason);
+    let found = std::fs::metadata(path).map_err(io)?.len();
+    if found > most {
+        return Err(invalid(InvalidSource::TooLarge { most, found }));
+    }
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = name.ok_or_else(|| invalid(InvalidSource::NotAFile))?;
+    let mut folder = SourceFolder::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(io)?;
+    let bytes = folder.read(&name).map_err(|fault| invalid(InvalidSource::Unreadable(fault)))?;
+    Ok((folder, name, bytes))
 }

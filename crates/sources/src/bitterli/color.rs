@@ -328,7 +328,7 @@ fn of_black_body(kelvin: f64) -> [f64; 3] {
 mod tests {
     use super::super::document::Document;
     use super::*;
-    use crate::log::Log;
+    use crate::source_scene::Log;
 
     fn color(element: &str, usage: ColorUse) -> Result<[f64; 3], ValueError> {
         let folder = tempfile::tempdir().unwrap();

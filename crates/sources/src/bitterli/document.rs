@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::error::BitterliError;
 use super::limits::Limits;
-use crate::log::Log;
+use crate::source_scene::Log;
 use mateval_image::file_kind::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;

@@ -10,7 +10,7 @@ use super::document::Element;
 use super::parameters::{COLORS, Parameters};
 use super::reader::Reader;
 use super::texture::all_texels;
-use crate::mean_color::mean_color;
+use crate::missing_uv::mean_color;
 use mateval_scene::findings::shortened;
 
 impl<'a> Reader<'a> {

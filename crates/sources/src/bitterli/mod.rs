@@ -19,7 +19,6 @@ mod error;
 mod ior;
 mod limits;
 mod parameters;
-pub mod primitives;
 mod reader;
 mod sensor;
 mod shape;
@@ -43,11 +42,11 @@ use mateval_scene::{Camera, Finding};
 
 use crate::coincident;
 use crate::error::{InvalidSource, SourceError};
-use crate::licence::read_licence;
-use crate::log::Log;
-use crate::shift::{self, shift_of};
+use crate::source_scene::Log;
+use crate::source_scene::UniqueNames;
+use crate::source_scene::read_licence;
 use crate::source_scene::{InstanceOrigin, LicenceText, Missing, is_optional};
-use crate::unique_names::UniqueNames;
+use crate::source_scene::{report_shift, shift_of};
 use document::Document;
 pub use error::{BitterliError, ValueError};
 pub use limits::Limits;
@@ -148,7 +147,7 @@ fn missing(document: &Document, left_out: Vec<String>, absent: &[String]) -> Mis
 }
 
 fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
-    let (source, name, bytes) = crate::source_scene::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
+    let (source, name, bytes) = crate::error::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
     let not_utf8 = |_| InvalidSource::NotUtf8 { hint: hint(&bytes).into_owned() };
     let text = std::str::from_utf8(without_mark(&bytes)).map_err(|e| SourceError::invalid(xml_path, not_utf8(e)))?;
     Ok((source, name, text.to_owned()))
@@ -178,7 +177,7 @@ fn read_elements<'a>(
     let sensor = elements().find(|element| element.tag == "sensor").ok_or(BitterliError::NoSensor)?;
     let camera = reader.sensor(sensor)?;
     reader.shift_m = shift_of(place.unwrap_or(camera.position()));
-    shift::report(reader.shift_m, &mut reader.log);
+    report_shift(reader.shift_m, &mut reader.log);
     let mut shapes = 0;
     for element in &document.root.children {
         match element.tag.as_str() {

@@ -5,7 +5,7 @@ use glam::DMat4;
 use super::document::{Element, Ids};
 use super::error::ValueError;
 use super::{transform, value};
-use crate::log::Log;
+use crate::source_scene::Log;
 use mateval_scene::findings::shortened;
 
 /// A plugin's children with references resolved.

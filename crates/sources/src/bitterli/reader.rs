@@ -11,8 +11,8 @@ use super::document::{Element, Ids};
 use super::limits::Limits;
 use super::parameters::Parameters;
 use super::texture_key::TextureKey;
-use crate::log::Log;
-use crate::unique_names::UniqueNames;
+use crate::source_scene::Log;
+use crate::source_scene::UniqueNames;
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 
 /// A scene under construction.

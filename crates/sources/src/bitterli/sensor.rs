@@ -8,7 +8,7 @@ use super::error::{BitterliError, ValueError};
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::value;
-use crate::log::Log;
+use crate::source_scene::Log;
 use mateval_scene::findings::shortened;
 
 /// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six digits.

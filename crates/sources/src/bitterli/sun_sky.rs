@@ -13,7 +13,7 @@ use super::reader::Reader;
 use super::sun::{self, CIE_Y_INTEGRAL, SUN_DIAMETER_DEG};
 use super::transform::rotation;
 use super::value;
-use crate::map_disc::{MapDisc, ROWS, texel_direction};
+use crate::primitives::{MapDisc, ROWS, texel_direction};
 
 /// The parameters of the plugins `sunsky`, `sun` and `sky`.
 #[derive(Clone, Copy, Debug)]
@@ -165,7 +165,7 @@ impl Dome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map_disc::texel_solid_angle;
+    use crate::primitives::texel_solid_angle;
 
     fn sky(elevation_deg: f64) -> SunSky {
         let (sin, cos) = elevation_deg.to_radians().sin_cos();

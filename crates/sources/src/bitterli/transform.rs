@@ -5,7 +5,7 @@ use glam::{DMat3, DMat4, DVec3};
 use super::document::Element;
 use super::error::ValueError;
 use super::value::{number, numbers, vector};
-use crate::log::Log;
+use crate::source_scene::Log;
 
 /// The last row of a matrix that is no projection.
 const AFFINE: [f64; 4] = [0.0, 0.0, 0.0, 1.0];

@@ -17,7 +17,7 @@ use super::class_table;
 use super::finish::{BLOCK, Finish};
 use super::house::{House, HouseMaterial};
 use super::model::{Library, is_folder_name};
-use crate::log::Log;
+use crate::source_scene::Log;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::FileFault;
 

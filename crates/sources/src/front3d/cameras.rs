@@ -8,7 +8,7 @@ use super::house_files::{HouseFiles, shown_path};
 use super::house_reader::designer_camera;
 use super::limits::Limits;
 use crate::error::{InvalidSource, SourceError};
-use crate::log::Log;
+use crate::source_scene::Log;
 
 /// The designers' cameras of a house.
 pub(super) struct Cameras {
@@ -23,7 +23,7 @@ pub(super) struct Cameras {
 pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut Log) -> Result<Cameras, SourceError> {
     let Some(beside) = &files.cameras else { return Ok(Cameras { all: house.cameras.clone(), hash: None }) };
     let path = files.root.join(beside);
-    let (folder, _, bytes) = crate::source_scene::open(&path, limits.json_bytes, limits.json_bytes)?;
+    let (folder, _, bytes) = crate::error::open(&path, limits.json_bytes, limits.json_bytes)?;
     let invalid = |error| SourceError::invalid(&path, InvalidSource::House(error));
     let tree = document::parse(&bytes, limits).map_err(invalid)?;
     let all = of_house(&tree, &house.uid);

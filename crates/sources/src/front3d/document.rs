@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::error::HouseError;
 use super::limits::Limits;
-use crate::json_size::JsonSize;
+use crate::source_scene::JsonSize;
 
 /// Parses an object. Fails where the text is not JSON, not an object, or exceeds `limits`.
 pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {

@@ -15,7 +15,7 @@ use super::limits::Limits;
 use super::model::Library;
 use super::{cameras, document, house_reader};
 use crate::error::{InvalidSource, SourceError};
-use crate::log::Log;
+use crate::source_scene::Log;
 
 /// Reads a house, its models and its textures.
 ///
@@ -62,7 +62,7 @@ pub fn read_house(path: &Path, limits: &Limits) -> Result<(House, Vec<Finding>),
 }
 
 fn read_json(path: &Path, limits: &Limits, log: &mut Log) -> Result<(House, SourceFolder), SourceError> {
-    let (folder, _, bytes) = crate::source_scene::open(path, limits.json_bytes, limits.json_bytes)?;
+    let (folder, _, bytes) = crate::error::open(path, limits.json_bytes, limits.json_bytes)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let house = document::parse(&bytes, limits).and_then(|tree| house_reader::read(&tree, &stem, limits, log));
     let house = house.map_err(|error| SourceError::invalid(path, InvalidSource::House(error)))?;

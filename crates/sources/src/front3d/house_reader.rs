@@ -13,8 +13,8 @@ use super::house::{
 };
 use super::house_mesh;
 use super::limits::Limits;
-use crate::log::Log;
-use crate::shift::{self, shift_of};
+use crate::source_scene::Log;
+use crate::source_scene::{report_shift, shift_of, shift_transform};
 use mateval_scene::findings::shortened;
 
 /// Reads the whole tree; `stem` is that of the file's name. Fails where it has no scene or exceeds `limits`.
@@ -27,8 +27,8 @@ pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> 
     let mut rooms = rooms(tree, &furniture, &meshes, limits, log)?;
     report_unused(&rooms, &meshes, log);
     let shift_m = shift_of(place_of(&rooms, &meshes));
-    shift::report(shift_m, log);
-    rooms.iter_mut().for_each(|room| room.house_from_room = shift::transform(shift_m) * room.house_from_room);
+    report_shift(shift_m, log);
+    rooms.iter_mut().for_each(|room| room.house_from_room = shift_transform(shift_m) * room.house_from_room);
     Ok(House {
         uid: text(tree, "uid").unwrap_or(stem).to_owned(),
         release,

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::document::{kind, parse_any, text};
 use super::house::FurnitureRecord;
 use super::limits::Limits;
-use crate::log::Log;
+use crate::source_scene::Log;
 use mateval_scene::super_categories::SUPER_CATEGORIES;
 
 /// Words in categories and titles, and the super-categories that they imply. The first match counts.

@@ -3,7 +3,7 @@
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::*;
-use crate::log::Log;
+use crate::source_scene::Log;
 use mateval_scene::source_folder::SourceFolder;
 
 /// The linear map that takes one list of points to another, by least squares about their middles.
