@@ -12,7 +12,6 @@
 
 pub mod below;
 pub mod bitterli;
-pub mod clearance;
 mod coincident;
 pub mod error;
 pub mod front3d;
@@ -26,6 +25,10 @@ pub mod surface_mesh;
 pub use error::{InvalidSource, SourceError};
 
 // OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod clearance {
+    pub use crate::front3d::camera_sampler::distance_to_anything;
+}
 #[doc(hidden)]
 pub mod parts {
     pub use crate::surface_mesh::{MAX_PARTS, connected_parts, parts_of_labels};

@@ -2,19 +2,18 @@
 
 use glam::{DMat3, DMat4, DVec3, Vec2};
 use mateval_scene::TriangleMesh;
+use mateval_scene::findings::shortened;
 use mateval_scene::material::StatedParameters;
+use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
+use mateval_scene::source_folder::FileFault;
 
 use super::document::Element;
-use super::parameters::Parameters;
-use super::reader::Reader;
+use super::reader::{Parameters, Reader};
 use crate::missing_uv::barycentric;
 use crate::primitives;
 use crate::source_scene::{shift_of, shift_transform};
 use crate::surface_mesh::{smooth_normals, to_world};
-use mateval_scene::findings::shortened;
-use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
-use mateval_scene::source_folder::FileFault;
 
 const LEFT_OUT: &str = "left the shape out";
 

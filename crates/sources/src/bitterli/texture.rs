@@ -2,16 +2,14 @@
 
 use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
 use mateval_image::{ImageError, Texels, Texture, Wrap};
+use mateval_scene::findings::shortened;
 use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;
+use mateval_scene::source_folder::FileFault;
 
 use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;
-use super::parameters::Parameters;
-use super::reader::Reader;
-use super::texture_key::{Aspect, TextureKey};
-use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::FileFault;
+use super::reader::{Aspect, Parameters, Reader};
 
 /// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
@@ -92,12 +90,14 @@ impl<'a> Reader<'a> {
         self.scalar_texture(element, &from.place, true)
     }
 
-    /// The luminance of a texture as heights; none where it cannot be read.
-    pub(super) fn height(&mut self, element: &'a Element, place: &str) -> Option<ScalarInput> {
-        self.scalar_texture(element, place, false)
-    }
-
-    fn scalar_texture(&mut self, element: &'a Element, place: &str, prefer_alpha: bool) -> Option<ScalarInput> {
+    /// A number from a texture: its alpha where `prefer_alpha` holds and that is not 1 everywhere, else its luminance. None
+    /// where it cannot be read.
+    pub(super) fn scalar_texture(
+        &mut self,
+        element: &'a Element,
+        place: &str,
+        prefer_alpha: bool,
+    ) -> Option<ScalarInput> {
         let bitmap = self.bitmap(element, place)?;
         let (aspect, channel) = match bitmap.channel {
             Some('a') => (Aspect::Alpha, 0),
@@ -235,7 +235,7 @@ impl<'a> Reader<'a> {
 
     /// Reads a texture, unless it has been read before. A fault of its file is reported once.
     fn texture(&mut self, bitmap: &Bitmap, aspect: Aspect) -> Option<TextureIndex> {
-        let key = TextureKey::new(&bitmap.file, bitmap.linear, bitmap.wrap, aspect);
+        let key = (bitmap.file.clone(), bitmap.linear, bitmap.wrap as u8, aspect);
         if let Some(known) = self.textures.get(&key) {
             return *known;
         }

@@ -6,20 +6,18 @@ use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_scene::Severity;
+use mateval_scene::findings::shortened;
 use mateval_scene::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
 use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::{MaterialIndex, SourceTexture};
+use mateval_scene::source_folder::FileFault;
 
-use super::appearance_rule::AppearanceRule;
-use super::class_table;
-use super::finish::{BLOCK, Finish};
 use super::house::{House, HouseMaterial};
+use super::material_class::{AppearanceRule, BLOCK, Finish, drawn};
 use super::model::{Library, is_folder_name};
 use crate::source_scene::Log;
-use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::FileFault;
 
 /// Linear mid-grey, which replaces a colour or texture that cannot be read.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
@@ -181,9 +179,7 @@ impl Appearances {
     fn numbers(&mut self, id: &str, classes: &[MaterialClass], uv: Option<UvTransform>) -> [ScalarInput; 2] {
         let drawn: Vec<[f32; 2]> = match self.rule {
             AppearanceRule::Constant => vec![[ROUGHNESS, METALLIC]],
-            AppearanceRule::Stated { seed } => {
-                classes.iter().map(|class| class_table::drawn(*class, id, seed)).collect()
-            }
+            AppearanceRule::Stated { seed } => classes.iter().map(|class| drawn(*class, id, seed)).collect(),
         };
         if let [one] = drawn[..] {
             return one.map(ScalarInput::Constant);

@@ -8,12 +8,13 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::reference::ReferenceScene;
+use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
 use super::camera_rules::{Coverage, SamplerRules};
-use super::furnished_house::FurnishedHouse;
-use crate::clearance::distance_to_anything;
+use super::furnish::FurnishedHouse;
 
 /// A camera that keeps to the rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -337,4 +338,29 @@ fn entropy_bits(counts: impl Iterator<Item = usize> + Clone) -> f64 {
         -share * libm::log2(share)
     };
     counts.filter(|count| *count > 0).map(bits).sum()
+}
+
+/// The distance in metres to the nearest triangle of the scene, or `enough` where that is smaller.
+pub fn distance_to_anything(scene: &ReferenceScene, from: DVec3, enough: f64) -> f64 {
+    let from = from.as_vec3();
+    let mut nearest = enough as f32;
+    for surface in &scene.surfaces {
+        nearest = nearest.min(distance_to_mesh(&surface.mesh, from, nearest));
+    }
+    f64::from(nearest)
+}
+
+/// The distance to the nearest point of a mesh, or `enough` where that is smaller.
+fn distance_to_mesh(mesh: &TriangleMesh, from: Vec3, enough: f32) -> f32 {
+    let mut nearest = enough;
+    for index in 0..mesh.triangles.len() {
+        let corners = mesh.corners(index);
+        // The bounding box excludes most triangles.
+        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+        if (from.clamp(low, high) - from).length() < nearest {
+            let corners = corners.map(|corner| corner.as_dvec3());
+            nearest = nearest.min(triangle::distance(corners, from.as_dvec3()) as f32);
+        }
+    }
+    nearest
 }

@@ -4,9 +4,106 @@
 use mateval_image::file_kind::{hint, without_mark};
 use serde_json::Value;
 
-use super::error::HouseError;
-use super::limits::Limits;
 use crate::source_scene::JsonSize;
+
+/// Upper bounds. A house that exceeds them is refused; a model or texture that does is a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of a house's JSON. The largest known house has a twentieth of it.
+    pub json_bytes: u64,
+    /// Values in the JSON: numbers, texts, lists, objects.
+    pub json_values: usize,
+    /// Lists and objects in the JSON, each of which takes more memory than a number.
+    pub json_containers: usize,
+    /// Bytes of any other file.
+    pub file_bytes: u64,
+    /// Triangles of all models and meshes.
+    pub triangles: usize,
+    /// Texels of all textures.
+    pub texels: usize,
+    /// Number of rooms.
+    pub rooms: usize,
+    /// Children of all rooms.
+    pub children: usize,
+    /// Number of findings. Further ones are only counted.
+    pub findings: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            json_bytes: 128 << 20,
+            json_values: 16 << 20,
+            json_containers: 1 << 20,
+            file_bytes: 256 << 20,
+            triangles: 20_000_000,
+            texels: 512 << 20,
+            rooms: 1_000,
+            children: 50_000,
+            findings: 5_000,
+        }
+    }
+}
+
+/// Why JSON is not that of a 3D-FRONT house, or exceeds a limit.
+#[derive(Debug, thiserror::Error)]
+pub enum HouseError {
+    /// The text is not JSON.
+    #[error("expected JSON: {reason}{hint}")]
+    NotJson {
+        /// The parser's reason.
+        reason: serde_json::Error,
+        /// What the file is instead, and what to do; empty where that is not known.
+        hint: String,
+    },
+    /// The JSON is not an object.
+    #[error("expected an object, found {found}")]
+    NotAnObject {
+        /// The kind of value.
+        found: &'static str,
+    },
+    /// The JSON holds more values than any file of the data.
+    #[error(
+        "expected at most {most_values} values and {most_containers} lists and objects, found {values} and {containers}"
+    )]
+    TooLarge {
+        /// Values in the JSON, about.
+        values: usize,
+        /// Lists and objects in the JSON.
+        containers: usize,
+        /// The most values allowed.
+        most_values: usize,
+        /// The most lists and objects allowed.
+        most_containers: usize,
+    },
+    /// The key `scene` is missing or not an object.
+    #[error("expected an object 'scene' with rooms, found none")]
+    NoScene,
+    /// The house has too many rooms.
+    #[error("/scene/room: expected at most {most} rooms, found {found}")]
+    TooManyRooms {
+        /// The most rooms allowed.
+        most: usize,
+        /// Rooms of the house.
+        found: usize,
+    },
+    /// The rooms have too many children.
+    #[error("{place}: expected at most {most} children in all rooms together, found more")]
+    TooManyChildren {
+        /// JSON pointer to the room at which the limit is exceeded.
+        place: String,
+        /// The most children allowed.
+        most: usize,
+    },
+    /// The meshes have too many triangles.
+    #[error("{place}: expected at most {most} triangles in all meshes together, found more")]
+    TooManyTriangles {
+        /// JSON pointer to the mesh at which the limit is exceeded.
+        place: String,
+        /// The most triangles allowed.
+        most: usize,
+    },
+}
 
 /// Parses an object. Fails where the text is not JSON, not an object, or exceeds `limits`.
 pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
