@@ -226,7 +226,6 @@ const MOST_PAIRS: usize = 50_000_000;
 
 /// A triangle in world space.
 struct Face {
-    /// Index of its surface.
     surface: usize,
     /// Index in the surface's mesh.
     triangle: usize,

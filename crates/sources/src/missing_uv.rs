@@ -124,7 +124,6 @@ impl Means {
         flat
     }
 
-    /// Makes a whole surface plain.
     fn flatten(&mut self, scene: &mut ReferenceScene, at: usize) {
         scene.surfaces[at].material = self.material(scene, scene.surfaces[at].material);
         scene.surfaces[at].mesh.uvs = None;

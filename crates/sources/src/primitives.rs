@@ -9,7 +9,6 @@ use mateval_scene::TriangleMesh;
 /// Segments of a full circle.
 pub(crate) const SEGMENTS: u32 = 64;
 
-/// A mesh under construction.
 #[derive(Default)]
 struct Builder {
     positions: Vec<Vec3>,

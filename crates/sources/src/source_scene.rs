@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
+use mateval_image::ImageError;
 use mateval_scene::material::StatedParameters;
 use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::ReferenceScene;
-use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
 use mateval_scene::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 
 /// A licence that must be passed on with the scene.
@@ -16,14 +17,12 @@ use mateval_scene::{Camera, Finding, Role, SceneLights, Severity, SourceKind, Tr
 pub struct LicenceText {
     /// The file's name in the scene's folder.
     pub file: String,
-    /// The file's text.
     pub text: String,
 }
 
 /// Facts about an instance besides its mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InstanceOrigin {
-    /// Its role in the scene.
     pub role: Role,
     /// Its category, as in `Dining Chair`.
     pub category: Option<String>,
@@ -71,7 +70,6 @@ impl Missing {
 /// A scene read from any source.
 #[derive(Clone, Debug)]
 pub struct SourceScene {
-    /// The kind of source.
     pub kind: SourceKind,
     /// Whether the source describes the scene's lights.
     pub lights: SceneLights,
@@ -114,6 +112,16 @@ pub(crate) fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<L
             None
         }
     }
+}
+
+/// The fault of a picture. Its message leaves out the path, which the finding gives.
+pub(crate) fn picture_fault(code: &'static str, error: &ImageError) -> FileFault {
+    let message = match error {
+        ImageError::Io { source, .. } => source.to_string(),
+        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
+        ImageError::PixelCount { .. } => error.to_string(),
+    };
+    FileFault { code, message }
 }
 
 /// A scene whose camera stands farther than this from the origin, in metres, is moved near to it before anything becomes

@@ -11,14 +11,11 @@ use mateval_scene::source_folder::SourceFolder;
 use super::document::{Element, ValueError};
 use super::reader::{number, number_within, numbers, triple};
 
-/// What a colour stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorUse {
     /// A share of light, from 0 to 1.
     Reflectance,
-    /// Radiance.
     Emission,
-    /// An index of refraction.
     Index,
 }
 

@@ -9,18 +9,16 @@ use mateval_scene::source_folder::SourceFolder;
 
 use crate::source_scene::Log;
 
-/// Upper bounds. Exceeding one is an error for the XML itself, and a finding for anything else.
+/// Limits on an untrusted scene, checked before memory is taken. Exceeding one is an error for the XML itself, and a finding for anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of the XML, before and after variables are substituted.
     pub xml_bytes: u64,
-    /// Depth of nested elements.
     pub xml_depth: usize,
     /// Bytes of any other file.
     pub file_bytes: u64,
     /// Bytes of all OBJ files, each counted as often as it is named. Once exceeded, no further file is read.
     pub mesh_bytes: u64,
-    /// Number of shapes.
     pub shapes: usize,
     /// Triangles of all shapes.
     pub triangles: usize,
@@ -51,157 +49,63 @@ impl Default for Limits {
 /// Why XML is not a Mitsuba scene, has no usable camera, or exceeds a limit.
 #[derive(Debug, thiserror::Error)]
 pub enum BitterliError {
-    /// The text is not well-formed XML.
     #[error("expected well-formed XML: {reason}")]
-    NotXml {
-        /// The parser's reason.
-        reason: roxmltree::Error,
-    },
-    /// Elements are nested too deeply.
+    NotXml { reason: roxmltree::Error },
     #[error("line {line}: expected elements nested at most {most} deep, found deeper ones")]
-    TooDeep {
-        /// The line.
-        line: usize,
-        /// The greatest depth allowed.
-        most: usize,
-    },
-    /// Substituting variables makes the text too large.
+    TooDeep { line: usize, most: usize },
     #[error("line {line}: the scene with its variables substituted is too large")]
-    TooLarge {
-        /// The line.
-        line: usize,
-    },
-    /// The root element is not `<scene>`.
+    TooLarge { line: usize },
     #[error("expected a Mitsuba scene, whose root element is <scene>, found <{found}>")]
-    NotAScene {
-        /// The root element's tag.
-        found: String,
-    },
-    /// The scene has no sensor.
+    NotAScene { found: String },
     #[error("expected a <sensor>, found none")]
     NoSensor,
-    /// The sensor is not a perspective camera.
     #[error("line {line}: the sensor '{kind}' is not supported; expected 'perspective' (a pinhole camera)")]
-    OtherSensor {
-        /// The sensor's line.
-        line: usize,
-        /// Its type.
-        kind: String,
-    },
-    /// An included file cannot be read.
+    OtherSensor { line: usize, kind: String },
     #[error("line {line}: <include>: {reason}")]
-    Include {
-        /// The element's line.
-        line: usize,
-        /// Why not.
-        reason: String,
-    },
-    /// The sensor's focal length is not a positive number of millimetres.
+    Include { line: usize, reason: String },
     #[error("line {line}: focal_length of the sensor: {reason}")]
-    FocalLength {
-        /// The sensor's line.
-        line: usize,
-        /// What was expected and what was found.
-        reason: ValueError,
-    },
-    /// The sensor's transform cannot be read.
+    FocalLength { line: usize, reason: ValueError },
     #[error("line {line}: expected a readable to_world of the sensor, found one with a faulty step")]
-    SensorTransform {
-        /// The sensor's line.
-        line: usize,
-    },
-    /// The sensor's transform is singular.
+    SensorTransform { line: usize },
     #[error("line {line}: expected an invertible to_world of the sensor, found a singular one")]
-    SingularSensor {
-        /// The sensor's line.
-        line: usize,
-    },
+    SingularSensor { line: usize },
 }
 
 /// Why the text of a parameter is not the value that is wanted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
-    /// It is not a finite number.
     #[error("expected a finite number, found '{found}'")]
-    NotANumber {
-        /// The beginning of the text.
-        found: String,
-    },
-    /// It is a number out of range.
+    NotANumber { found: String },
     #[error("expected {least} to {most}, found {found}")]
-    OutOfRange {
-        /// The least number allowed.
-        least: f64,
-        /// The greatest number allowed.
-        most: f64,
-        /// The number.
-        found: f64,
-    },
-    /// It is not a positive number.
+    OutOfRange { least: f64, most: f64, found: f64 },
     #[error("expected a number above 0, found {found}")]
-    NotPositive {
-        /// The number.
-        found: f64,
-    },
-    /// It is a list of another length.
+    NotPositive { found: f64 },
     #[error("expected {expected} numbers, found {found}")]
     Count {
         /// The lengths allowed, as in `1 or 3`.
         expected: &'static str,
-        /// The length of the list.
         found: usize,
     },
-    /// It is a longer list than any value has.
     #[error("expected at most {most} numbers, found more")]
-    TooManyNumbers {
-        /// The greatest length allowed.
-        most: usize,
-    },
-    /// It is neither `true` nor `false`.
+    TooManyNumbers { most: usize },
     #[error("expected true or false, found '{found}'")]
-    NotABoolean {
-        /// The beginning of the text.
-        found: String,
-    },
-    /// It is not a hexadecimal colour.
+    NotABoolean { found: String },
     #[error("expected # and six hexadecimal digits, found '{found}'")]
-    NotHex {
-        /// The beginning of the text.
-        found: String,
-    },
-    /// It is not a pair of a wavelength and a value.
+    NotHex { found: String },
     #[error("expected wavelength:value, found '{found}'")]
-    NotAPair {
-        /// The beginning of the text.
-        found: String,
-    },
-    /// Its pairs are not those of a spectrum.
+    NotAPair { found: String },
     #[error("expected two or more wavelengths, each above the one before")]
     NotASpectrum,
-    /// A parameter of the spectrum is missing.
     #[error("expected '{name}', found none")]
-    Missing {
-        /// The parameter.
-        name: &'static str,
-    },
-    /// The file of the spectrum cannot be read.
+    Missing { name: &'static str },
     #[error("{reason}")]
-    File {
-        /// Why not.
-        reason: String,
-    },
-    /// The element is the emission of a black body, where a reflectance is wanted.
+    File { reason: String },
     #[error("expected a reflectance, found the emission of a black body")]
     NotAReflectance,
-    /// The element does not describe a colour.
     #[error("expected a colour, found <{found}>")]
-    NotAColor {
-        /// The element's tag.
-        found: String,
-    },
+    NotAColor { found: String },
 }
 
-/// One XML element.
 #[derive(Debug)]
 pub(super) struct Element {
     /// The tag, with `lookAt` and `look_at` written `lookat`.
@@ -218,7 +122,6 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// The value of an attribute.
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
@@ -248,7 +151,6 @@ impl Element {
 /// A scene file.
 #[derive(Debug)]
 pub(super) struct Document {
-    /// The `<scene>`.
     pub(super) root: Element,
     /// The first number of the scene's version: 0 for Mitsuba 0.5 and 0.6, 3 for Mitsuba 3.
     pub(super) major_version: u32,

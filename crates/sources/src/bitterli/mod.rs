@@ -38,7 +38,6 @@ use document::Document;
 pub use document::{BitterliError, Limits, ValueError};
 use reader::{Reader, Totals};
 
-/// A scene of Bitterli's resources.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BitterliScene {
     /// Name and author from the licence, as in `'Modern Hall' by NewSee2l035`, or else the folder's name.

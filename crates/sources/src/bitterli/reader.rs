@@ -205,7 +205,6 @@ impl<'a> Parameters<'a> {
         value.map_err(report).ok()
     }
 
-    /// Takes a finite number.
     pub(super) fn number(&mut self, name: &str, log: &mut Log) -> Option<f64> {
         self.value(name, number, log)
     }
@@ -215,17 +214,14 @@ impl<'a> Parameters<'a> {
         self.value(name, |text| number_within(text, least, most), log)
     }
 
-    /// Takes `true` or `false`.
     pub(super) fn boolean(&mut self, name: &str, default: bool, log: &mut Log) -> bool {
         self.value(name, boolean, log).unwrap_or(default)
     }
 
-    /// Takes a text.
     pub(super) fn string(&mut self, name: &str) -> Option<&'a str> {
         self.take(&[name]).and_then(|element| element.attribute("value"))
     }
 
-    /// Takes a vector or point.
     pub(super) fn vector(&mut self, name: &str, log: &mut Log) -> Option<[f64; 3]> {
         let element = self.take(&[name])?;
         self.value_or_finding(name, element, vector(element, 0.0), log)
@@ -275,7 +271,6 @@ fn resolve<'a>(reference: &Element, place: &str, ids: &Ids<'a>, log: &mut Log) -
 /// The longest list of numbers that any value has, with room to spare.
 const MOST_NUMBERS: usize = 64;
 
-/// One finite number.
 pub(super) fn number(text: &str) -> Result<f64, ValueError> {
     let trimmed = text.trim();
     let refused = || ValueError::NotANumber { found: shortened(trimmed) };
@@ -313,7 +308,6 @@ pub(super) fn vector(element: &Element, missing: f64) -> Result<[f64; 3], ValueE
     Ok([axis("x")?, axis("y")?, axis("z")?])
 }
 
-/// `true` or `false`.
 pub(super) fn boolean(text: &str) -> Result<bool, ValueError> {
     match text.trim().to_ascii_lowercase().as_str() {
         "true" => Ok(true),

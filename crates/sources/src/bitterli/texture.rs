@@ -1,7 +1,7 @@
 //! Colour and number parameters: constants, or bitmaps read from files.
 
 use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
-use mateval_image::{ImageError, Texels, Texture, Wrap};
+use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::findings::shortened;
 use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;
@@ -10,6 +10,7 @@ use mateval_scene::source_folder::FileFault;
 use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;
 use super::reader::{Aspect, Parameters, Reader};
+use crate::source_scene::picture_fault;
 
 /// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
@@ -274,10 +275,16 @@ impl<'a> Reader<'a> {
         self.source.read(file)?;
         let encoding = if linear { Encoding::Linear } else { Encoding::Srgb };
         let texture = if alpha { read_alpha(&path, wrap) } else { read_texture(&path, encoding, wrap).map(Some) };
-        let texture = texture.map_err(|error| picture_fault(file, &error))?.ok_or_else(|| FileFault {
-            code: "bad_value",
-            message: format!("'{}' has no alpha channel", shortened(file)),
-        })?;
+        let texture = texture
+            .map_err(|error| {
+                // Without the folders of this machine.
+                let FileFault { code, message } = picture_fault("unreadable_texture", &error);
+                FileFault { code, message: format!("'{}': {message}", shortened(file)) }
+            })?
+            .ok_or_else(|| FileFault {
+                code: "bad_value",
+                message: format!("'{}' has no alpha channel", shortened(file)),
+            })?;
         let total = self.texels.saturating_add(texture.width().saturating_mul(texture.height()));
         if total > self.limits.texels {
             let message = format!("all textures together have more than {} texels", self.limits.texels);
@@ -289,16 +296,6 @@ impl<'a> Reader<'a> {
 }
 
 const TEXTURE_LEFT_OUT: &str = "used linear mid-grey 0.5; as opacity or bump map, nothing";
-
-/// The fault of a picture. Its message names the file relative to the scene, without the folders of this machine.
-fn picture_fault(file: &str, error: &ImageError) -> FileFault {
-    let what = match error {
-        ImageError::Io { source, .. } => source.to_string(),
-        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
-        ImageError::PixelCount { .. } => error.to_string(),
-    };
-    FileFault { code: "unreadable_texture", message: format!("'{}': {what}", shortened(file)) }
-}
 
 /// The luminance of a linear colour by Mitsuba's own weights, which have more digits than those of Rec. 709.
 pub(super) fn luminance(rgb: [f32; 3]) -> f32 {

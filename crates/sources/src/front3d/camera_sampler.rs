@@ -19,7 +19,6 @@ use super::furnish::FurnishedHouse;
 /// A camera that keeps to the rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundCamera {
-    /// The input camera.
     pub camera: Camera,
     /// The [`score`] of the input view.
     pub score: f64,
@@ -96,26 +95,14 @@ impl Refusals {
 /// Why no camera can be drawn in a room.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// The room has no floor.
     #[error("room '{room}' has no floor for a camera to stand on; give a camera by hand")]
-    NoFloor {
-        /// The room's id.
-        room: String,
-    },
-    /// Every draw breaks a rule.
+    NoFloor { room: String },
     #[error(
         "none of {} cameras drawn in room '{room}' keeps the rules: {}; give a camera by hand, or try other rules or \
          another seed",
         rules.tries, refusals.counted(rules)
     )]
-    NoneFound {
-        /// The room's id.
-        room: String,
-        /// The rules.
-        rules: Box<SamplerRules>,
-        /// How many draws broke each rule.
-        refusals: Refusals,
-    },
+    NoneFound { room: String, rules: Box<SamplerRules>, refusals: Refusals },
 }
 
 /// A room made ready for drawing many cameras.

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::source_scene::JsonSize;
 
-/// Upper bounds. A house that exceeds them is refused; a model or texture that does is a finding.
+/// Limits on an untrusted house, checked before memory is taken. A house that exceeds them is refused; a model or texture that does is a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of a house's JSON. The largest known house has a twentieth of it.
@@ -21,7 +21,6 @@ pub struct Limits {
     pub triangles: usize,
     /// Texels of all textures.
     pub texels: usize,
-    /// Number of rooms.
     pub rooms: usize,
     /// Children of all rooms.
     pub children: usize,
@@ -48,59 +47,33 @@ impl Default for Limits {
 /// Why JSON is not that of a 3D-FRONT house, or exceeds a limit.
 #[derive(Debug, thiserror::Error)]
 pub enum HouseError {
-    /// The text is not JSON.
     #[error("expected JSON: {reason}{hint}")]
     NotJson {
-        /// The parser's reason.
         reason: serde_json::Error,
         /// What the file is instead, and what to do; empty where that is not known.
         hint: String,
     },
-    /// The JSON is not an object.
     #[error("expected an object, found {found}")]
-    NotAnObject {
-        /// The kind of value.
-        found: &'static str,
-    },
+    NotAnObject { found: &'static str },
     /// The JSON holds more values than any file of the data.
     #[error(
         "expected at most {most_values} values and {most_containers} lists and objects, found {values} and {containers}"
     )]
-    TooLarge {
-        /// Values in the JSON, about.
-        values: usize,
-        /// Lists and objects in the JSON.
-        containers: usize,
-        /// The most values allowed.
-        most_values: usize,
-        /// The most lists and objects allowed.
-        most_containers: usize,
-    },
-    /// The key `scene` is missing or not an object.
+    TooLarge { values: usize, containers: usize, most_values: usize, most_containers: usize },
     #[error("expected an object 'scene' with rooms, found none")]
     NoScene,
-    /// The house has too many rooms.
     #[error("/scene/room: expected at most {most} rooms, found {found}")]
-    TooManyRooms {
-        /// The most rooms allowed.
-        most: usize,
-        /// Rooms of the house.
-        found: usize,
-    },
-    /// The rooms have too many children.
+    TooManyRooms { most: usize, found: usize },
     #[error("{place}: expected at most {most} children in all rooms together, found more")]
     TooManyChildren {
         /// JSON pointer to the room at which the limit is exceeded.
         place: String,
-        /// The most children allowed.
         most: usize,
     },
-    /// The meshes have too many triangles.
     #[error("{place}: expected at most {most} triangles in all meshes together, found more")]
     TooManyTriangles {
         /// JSON pointer to the mesh at which the limit is exceeded.
         place: String,
-        /// The most triangles allowed.
         most: usize,
     },
 }
@@ -114,18 +87,12 @@ pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
 /// Parses any JSON. Fails where the text is not JSON or exceeds `limits`.
 pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
     let text = without_mark(text);
-    check_size(text, limits)?;
-    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason, hint: hint(text).into_owned() })
-}
-
-/// Counts the values in the text before it is parsed.
-fn check_size(text: &[u8], limits: &Limits) -> Result<(), HouseError> {
     let JsonSize { values, containers } = JsonSize::of(text);
     if values > limits.json_values || containers > limits.json_containers {
         let (most_values, most_containers) = (limits.json_values, limits.json_containers);
         return Err(HouseError::TooLarge { values, containers, most_values, most_containers });
     }
-    Ok(())
+    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason, hint: hint(text).into_owned() })
 }
 
 /// The type of a value, for messages.

@@ -27,7 +27,6 @@ use crate::{coincident, missing_uv};
 /// The model of a piece of furniture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlacedModel {
-    /// The model's id.
     pub jid: String,
     /// The name that BlenderProc would give the piece, in lower case: category, else title.
     pub name: String,
@@ -51,7 +50,6 @@ pub struct PlacedSurface {
 /// A house with its furniture, without lights.
 #[derive(Clone, Debug)]
 pub struct FurnishedHouse {
-    /// The content of the JSON.
     pub house: House,
     /// The house's file, as findings name it.
     pub file: String,
@@ -80,7 +78,6 @@ pub struct FurnishedHouse {
 pub struct HouseFiles {
     /// The folder that the other paths are relative to.
     pub root: PathBuf,
-    /// The house's JSON.
     pub house: PathBuf,
     /// 3D-FUTURE's folder, with `model_info.json` and a folder for each model.
     pub models: PathBuf,
@@ -106,19 +103,44 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     let (house, house_folder) = read_json(&path, limits, &mut log)?;
 
     // Its rooms, with models and textures.
-    let models = library(files, &files.models, limits)?;
+    let mut models = library(files, &files.models, limits)?;
     let textures = files.textures.as_ref().map(|path| library(files, path, limits)).transpose()?;
-    let mut furnisher = Furnisher::new(&house, models, textures, limits, files, log);
+    let mut furnisher = Furnisher {
+        house: &house,
+        info: read_model_info(&mut models, limits, &mut log),
+        models,
+        textures,
+        limits: *limits,
+        compat: files.blenderproc_compat,
+        log,
+        known_models: BTreeMap::new(),
+        appearances: Appearances::new(limits.texels, files.appearance),
+        triangles: 0,
+        surfaces: Vec::new(),
+        placed: Vec::new(),
+    };
     let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.add_room(room)).collect();
-    let Furnished { scene, placed, mut log, libraries } = furnisher.finish();
+
+    // Findings and repairs that concern all rooms.
+    furnisher.report_private_pieces();
+    let Furnisher { mut log, appearances, surfaces, mut placed, models, textures: texture_library, .. } = furnisher;
+    appearances.report_untextured(&mut log);
+    let Appearances { materials, textures, .. } = appearances;
+    let mut scene = ReferenceScene { surfaces, materials, textures, lights: Vec::new() };
+    let mut origins: Vec<InstanceOrigin> = placed.iter().map(|placed| placed.origin.clone()).collect();
+    for split in missing_uv::resolve(&mut scene, &mut origins, &mut log) {
+        placed.push(placed[split].clone());
+    }
+    coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
+    placed.iter_mut().zip(origins).for_each(|(placed, origin)| placed.origin = origin);
 
     // The designers' cameras, and the list of all files.
-    let cameras = house::designer_cameras(&house, &files.root, files.cameras.as_deref(), limits, &mut log)?;
+    let (cameras, hash) = house::designer_cameras(&house, &files.root, files.cameras.as_deref(), limits, &mut log)?;
     let mut looked_for = house_folder.into_files().renamed(|_| file.clone());
-    libraries.into_iter().map(Library::into_files).for_each(|files| looked_for.extend(files));
-    looked_for.extend(LookedFor { hashes: cameras.hash.into_iter().collect(), absent: Vec::new() });
+    [Some(models), texture_library].into_iter().flatten().for_each(|library| looked_for.extend(library.into_files()));
+    looked_for.extend(LookedFor { hashes: hash.into_iter().collect(), absent: Vec::new() });
     Ok(FurnishedHouse {
-        cameras: cameras.all.into_iter().map(|camera| mirrored(camera, files.blenderproc_compat)).collect(),
+        cameras: cameras.into_iter().map(|camera| mirrored(camera, files.blenderproc_compat)).collect(),
         shift_m: world_from_house(files.blenderproc_compat).transform_vector3(house.shift_m),
         house,
         file,
@@ -164,8 +186,7 @@ const SMALLEST_SCALE: f64 = 1e-5;
 /// The super-category of lamps. (BlenderProc makes lamps also of pieces with "lamp" in their names.)
 const LIGHTING: &str = "Lighting";
 
-/// A house's scene under construction.
-pub(super) struct Furnisher<'a> {
+struct Furnisher<'a> {
     house: &'a House,
     info: ModelInfo,
     models: Library,
@@ -181,60 +202,9 @@ pub(super) struct Furnisher<'a> {
     placed: Vec<PlacedSurface>,
 }
 
-/// The result of a [`Furnisher`].
-pub(super) struct Furnished {
-    /// The scene, without lights.
-    pub(super) scene: ReferenceScene,
-    /// Facts about each surface.
-    pub(super) placed: Vec<PlacedSurface>,
-    pub(super) log: Log,
-    /// The folders of models and textures, which know the hashes of the files read.
-    pub(super) libraries: Vec<Library>,
-}
-
-impl<'a> Furnisher<'a> {
-    pub(super) fn new(
-        house: &'a House,
-        mut models: Library,
-        textures: Option<Library>,
-        limits: &Limits,
-        files: &HouseFiles,
-        mut log: Log,
-    ) -> Self {
-        Self {
-            house,
-            info: read_model_info(&mut models, limits, &mut log),
-            models,
-            textures,
-            limits: *limits,
-            compat: files.blenderproc_compat,
-            log,
-            known_models: BTreeMap::new(),
-            appearances: Appearances::new(limits.texels, files.appearance),
-            triangles: 0,
-            surfaces: Vec::new(),
-            placed: Vec::new(),
-        }
-    }
-
-    /// Finishes the scene and reports the findings that concern all rooms.
-    pub(super) fn finish(mut self) -> Furnished {
-        self.report_private_pieces();
-        self.appearances.report_untextured(&mut self.log);
-        let Appearances { materials, textures, .. } = self.appearances;
-        let mut scene = ReferenceScene { surfaces: self.surfaces, materials, textures, lights: Vec::new() };
-        let mut origins: Vec<InstanceOrigin> = self.placed.iter().map(|placed| placed.origin.clone()).collect();
-        for split in missing_uv::resolve(&mut scene, &mut origins, &mut self.log) {
-            self.placed.push(self.placed[split].clone());
-        }
-        coincident::separate(&mut scene.surfaces, &mut origins, &mut self.log);
-        self.placed.iter_mut().zip(origins).for_each(|(placed, origin)| placed.origin = origin);
-        let libraries = [Some(self.models), self.textures].into_iter().flatten().collect();
-        Furnished { scene, placed: self.placed, log: self.log, libraries }
-    }
-
+impl Furnisher<'_> {
     /// Places all children of a room. Returns how many of them are valid pieces of furniture.
-    pub(super) fn add_room(&mut self, room: usize) -> usize {
+    fn add_room(&mut self, room: usize) -> usize {
         self.add_architecture(room);
         let mut wanted = 0;
         for child in &self.house.rooms[room].children {

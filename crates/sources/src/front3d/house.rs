@@ -15,29 +15,14 @@ use super::house_mesh;
 use crate::error::{InvalidSource, SourceError, open};
 use crate::source_scene::{Log, report_shift, shift_of, shift_transform};
 
-/// Which release of 3D-FRONT wrote the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Release {
-    /// February 2021: no version.
-    R1,
-    /// Version 2.0 without lights.
-    R2,
-    /// Version 2.0 with lights; materials have a `UVTransform`.
-    R3,
-}
-
-/// The checked content of a house's JSON.
+/// The checked content of a house's JSON. V-Ray lights are left out, since their units are V-Ray's own.
 #[derive(Clone, Debug)]
 pub struct House {
     /// Its uid, or the file's stem where it has none.
     pub uid: String,
-    /// The release that the file belongs to.
-    pub release: Release,
     /// Records of furniture, including those that are not valid.
     pub furniture: Vec<FurnitureRecord>,
-    /// Meshes of the architecture.
     pub meshes: Vec<HouseMesh>,
-    /// Materials of the meshes.
     pub materials: Vec<HouseMaterial>,
     /// Rooms, in the file's order.
     pub rooms: Vec<Room>,
@@ -45,8 +30,6 @@ pub struct House {
     pub cameras: Vec<DesignerCamera>,
     /// What has been subtracted from the places of rooms and cameras: whole metres far from the origin, else nothing.
     pub shift_m: DVec3,
-    /// Number of V-Ray lights. They are not used, since their units are V-Ray's own.
-    pub lights: usize,
 }
 
 /// A record of furniture, to which children of rooms refer.
@@ -56,9 +39,7 @@ pub struct FurnitureRecord {
     pub uid: String,
     /// The name of its model's folder.
     pub jid: String,
-    /// Whether its model is public.
     pub valid: bool,
-    /// The file's category.
     pub category: Option<String>,
     /// The file's title, as in `lighting/pendant light`.
     pub title: Option<String>,
@@ -83,7 +64,6 @@ pub struct HouseMesh {
     pub place: String,
 }
 
-/// A material of the architecture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HouseMaterial {
     /// The uid by which meshes refer to it.
@@ -100,7 +80,6 @@ pub struct HouseMaterial {
     pub place: String,
 }
 
-/// A room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
     /// Its instanceid, as in `LivingDiningRoom-1912`.
@@ -111,8 +90,6 @@ pub struct Room {
     pub house_from_room: DMat4,
     /// Its meshes and pieces of furniture.
     pub children: Vec<Child>,
-    /// JSON pointer to the record.
-    pub place: String,
 }
 
 /// A mesh or a piece of furniture in a room.
@@ -120,9 +97,6 @@ pub struct Room {
 pub struct Child {
     /// The record that it refers to.
     pub what: ChildKind,
-    /// Its instanceid, as in `furniture/147`.
-    pub id: String,
-    /// Its placement in the room.
     pub placement: Placement,
     /// JSON pointer to the child.
     pub place: String,
@@ -150,10 +124,8 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The identity.
     pub const IDENTITY: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
 
-    /// The placement as a matrix.
     pub fn matrix(&self) -> DMat4 {
         DMat4::from_scale_rotation_translation(self.scale, self.rotation, self.position)
     }
@@ -200,7 +172,6 @@ impl House {
 
 /// Reads the whole tree; `stem` is that of the file's name. Fails where it has no scene or exceeds `limits`.
 pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> Result<House, HouseError> {
-    let release = release(tree);
     let materials = materials(tree, log);
     let material_of: BTreeMap<&str, usize> = materials.iter().enumerate().map(|(k, m)| (m.uid.as_str(), k)).collect();
     let meshes = meshes(tree, &material_of, limits, log)?;
@@ -212,10 +183,8 @@ pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> 
     rooms.iter_mut().for_each(|room| room.house_from_room = shift_transform(shift_m) * room.house_from_room);
     Ok(House {
         uid: text(tree, "uid").unwrap_or(stem).to_owned(),
-        release,
         cameras: snapshots(tree, log).into_iter().map(|camera| camera.shifted(shift_m)).collect(),
         shift_m,
-        lights: list(tree, "lights").len(),
         furniture,
         meshes,
         materials,
@@ -232,14 +201,6 @@ fn place_of(rooms: &[Room], meshes: &[HouseMesh]) -> DVec3 {
         Some((room.house_from_room * child.placement.matrix()).transform_point3(corner))
     });
     corners.next().unwrap_or(DVec3::ZERO)
-}
-
-fn release(tree: &Value) -> Release {
-    match (tree.get("version"), tree.get("lights"), tree.get("materialList")) {
-        (None, None, None) => Release::R1,
-        (_, None, None) => Release::R2,
-        _ => Release::R3,
-    }
 }
 
 /// The records of the list at `key` with their index and uid. Of several with one uid, the first counts.
@@ -387,15 +348,24 @@ fn rooms(
     };
     // Every room, within the limit on children.
     let mut rooms: Vec<Room> = Vec::new();
-    let mut children = 0;
+    let mut child_count = 0;
     for (at, record) in found.iter().enumerate() {
         let place = format!("/scene/room/{at}");
-        children += list(record, "children").len();
-        if children > limits.children {
+        child_count += list(record, "children").len();
+        if child_count > limits.children {
             return Err(HouseError::TooManyChildren { place, most: limits.children });
         }
         let id = room_id(record, at, &rooms, &place, log);
-        rooms.push(room(record, id, place, house_from_scene, &records, log));
+        let children = list(record, "children").iter().enumerate();
+        let children = children.filter_map(|(at, child)| {
+            let place = format!("{place}/children/{at}");
+            let what = child_kind(child, &place, &records, log)?;
+            Some(Child { what, placement: placement(child, &place, log), place })
+        });
+        let children = children.collect();
+        let kind = text(record, "type").unwrap_or("OtherRoom").to_owned();
+        let house_from_room = house_from_scene * placement(record, &place, log).matrix();
+        rooms.push(Room { id, kind, house_from_room, children });
     }
     Ok(rooms)
 }
@@ -420,32 +390,6 @@ struct Records<'a> {
     meshes: BTreeMap<&'a str, usize>,
     /// The uids of all meshes, including those that were left out.
     listed_meshes: BTreeSet<&'a str>,
-}
-
-fn room(
-    record: &Value,
-    id: String,
-    place: String,
-    house_from_scene: DMat4,
-    records: &Records<'_>,
-    log: &mut Log,
-) -> Room {
-    let children = list(record, "children").iter().enumerate();
-    let children = children
-        .filter_map(|(at, child)| {
-            let place = format!("{place}/children/{at}");
-            let what = child_kind(child, &place, records, log)?;
-            let id = text(child, "instanceid").unwrap_or("").to_owned();
-            Some(Child { what, id, placement: placement(child, &place, log), place })
-        })
-        .collect();
-    Room {
-        kind: text(record, "type").unwrap_or("OtherRoom").to_owned(),
-        house_from_room: house_from_scene * placement(record, &place, log).matrix(),
-        id,
-        children,
-        place,
-    }
 }
 
 /// The record that a child refers to. In later releases half of the references to furniture are dangling, since those
@@ -527,31 +471,23 @@ fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
 }
 
 /// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; none where one of them is missing or faulty.
-pub(super) fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
+fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     let (position, target) = (numbers::<3>(record, "pos")?, numbers::<3>(record, "target")?);
     let fov_y_deg = record.get("fov").and_then(super::document::number).filter(|fov| (1.0..179.0).contains(fov))?;
     let (position, target) = (DVec3::from_array(position), DVec3::from_array(target));
     (position.distance(target) > 1e-6).then_some(DesignerCamera { number, position, target, fov_y_deg })
 }
 
-/// The designers' cameras of a house.
-pub(super) struct DesignerCameras {
-    /// The cameras, sorted by number.
-    pub(super) all: Vec<DesignerCamera>,
-    /// The path and the hash of the file beside the house, if it was read.
-    pub(super) hash: Option<(String, String)>,
-}
-
 /// The cameras from the file `beside` the house, relative to `root`. Without such a file, or where it has none for this house, those from the
-/// house's JSON.
+/// house's JSON. Sorted by number. Returns the path and the hash of the file too, if it was read.
 pub(super) fn designer_cameras(
     house: &House,
     root: &Path,
     beside: Option<&Path>,
     limits: &Limits,
     log: &mut Log,
-) -> Result<DesignerCameras, SourceError> {
-    let Some(beside) = beside else { return Ok(DesignerCameras { all: house.cameras.clone(), hash: None }) };
+) -> Result<(Vec<DesignerCamera>, Option<(String, String)>), SourceError> {
+    let Some(beside) = beside else { return Ok((house.cameras.clone(), None)) };
     let path = root.join(beside);
     let (folder, _, bytes) = open(&path, limits.json_bytes, limits.json_bytes)?;
     let invalid = |error| SourceError::invalid(&path, InvalidSource::House(error));
@@ -564,7 +500,7 @@ pub(super) fn designer_cameras(
         log.push(Severity::Note, "no_camera", &shown_path(beside), "", message, action);
     }
     let hash = folder.into_files().hashes.into_iter().next().map(|(_, hash)| (shown_path(beside), hash));
-    Ok(DesignerCameras { all: if all.is_empty() { house.cameras.clone() } else { all }, hash })
+    Ok((if all.is_empty() { house.cameras.clone() } else { all }, hash))
 }
 
 /// A path with forward slashes, as findings and lists of files give it.

@@ -17,8 +17,50 @@ use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::material::UvTransform;
 use mateval_scene::material_class::MaterialClass;
 
-/// A row of the table.
-pub(super) struct ClassRow {
+/// How roughness and metallic are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AppearanceRule {
+    /// Roughness 0.5 and metallic 0 everywhere, as in BlenderProc.
+    #[default]
+    Constant,
+    /// By the class of material that the data states, with a roughness drawn from the range of that class.
+    Stated { seed: u64 },
+}
+
+/// The class of a model: that of its `material` in `model_info.json`, or else a usual one of its super-category, which
+/// is our choice.
+pub(super) fn class_of_model(material: Option<&str>, super_category: &str) -> MaterialClass {
+    material.and_then(class_named).unwrap_or(match super_category {
+        "Sofa" | "Bed" | "Pier/Stool" => MaterialClass::Cloth,
+        "Chair" | "Table" => MaterialClass::Wood,
+        "Cabinet/Shelf/Desk" => MaterialClass::Board,
+        _ => MaterialClass::Plastic,
+    })
+}
+
+/// The class of a model's group: that of its name, or else the model's.
+pub(super) fn class_of_group(name: &str, model: MaterialClass) -> MaterialClass {
+    class_named(name).unwrap_or(model)
+}
+
+/// The class of a mesh of the architecture: that of its material's content type, or else a usual one of its type and
+/// room, which is our choice: floors are of wood, or of tiles where they become wet; fittings are lacquered; all else
+/// is painted.
+pub(super) fn class_of_architecture(content: Option<&str>, kind: &str, room: &str) -> MaterialClass {
+    const WET: [&str; 3] = ["bathroom", "kitchen", "balcony"];
+    const FITTINGS: [&str; 9] =
+        ["baseboard", "door", "window", "cabinet", "pocket", "hole", "furniture", "wainscot", "lightband"];
+    let (kind, room) = (kind.to_lowercase(), room.to_lowercase());
+    let is_any = |text: &str, words: &[&str]| words.iter().any(|word| text.contains(word));
+    content.and_then(class_named).unwrap_or(match () {
+        () if kind.contains("floor") && is_any(&room, &WET) => MaterialClass::Tile,
+        () if kind.contains("floor") => MaterialClass::Wood,
+        () if is_any(&kind, &FITTINGS) => MaterialClass::Lacquer,
+        () => MaterialClass::Paint,
+    })
+}
+
+struct ClassRow {
     pub(super) class: MaterialClass,
     /// Lower-case words that select the class, where the data's name contains one of them.
     words: &'static [&'static str],
@@ -32,7 +74,7 @@ pub(super) struct ClassRow {
 
 /// Every class. Words are compared row by row, so `rough cloth` is looked for before `cloth`, and `plywood` before
 /// `wood`.
-pub(super) const TABLE: [ClassRow; 15] = [
+const TABLE: [ClassRow; 15] = [
     ClassRow {
         class: MaterialClass::Glass,
         words: &["glass"],
@@ -156,52 +198,6 @@ pub(super) fn drawn(class: MaterialClass, id: &str, seed: u64) -> [f32; 2] {
     [low + (high - low) * (bits as f32 / (1 << 24) as f32), row.metallic]
 }
 
-/// How roughness and metallic are chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum AppearanceRule {
-    /// Roughness 0.5 and metallic 0 everywhere, as in BlenderProc.
-    #[default]
-    Constant,
-    /// By the class of material that the data states, with a roughness drawn from the range of that class.
-    Stated {
-        /// The seed of the draws.
-        seed: u64,
-    },
-}
-
-/// The class of a model: that of its `material` in `model_info.json`, or else a usual one of its super-category, which
-/// is our choice.
-pub(super) fn class_of_model(material: Option<&str>, super_category: &str) -> MaterialClass {
-    material.and_then(class_named).unwrap_or(match super_category {
-        "Sofa" | "Bed" | "Pier/Stool" => MaterialClass::Cloth,
-        "Chair" | "Table" => MaterialClass::Wood,
-        "Cabinet/Shelf/Desk" => MaterialClass::Board,
-        _ => MaterialClass::Plastic,
-    })
-}
-
-/// The class of a model's group: that of its name, or else the model's.
-pub(super) fn class_of_group(name: &str, model: MaterialClass) -> MaterialClass {
-    class_named(name).unwrap_or(model)
-}
-
-/// The class of a mesh of the architecture: that of its material's content type, or else a usual one of its type and
-/// room, which is our choice: floors are of wood, or of tiles where they become wet; fittings are lacquered; all else
-/// is painted.
-pub(super) fn class_of_architecture(content: Option<&str>, kind: &str, room: &str) -> MaterialClass {
-    const WET: [&str; 3] = ["bathroom", "kitchen", "balcony"];
-    const FITTINGS: [&str; 9] =
-        ["baseboard", "door", "window", "cabinet", "pocket", "hole", "furniture", "wainscot", "lightband"];
-    let (kind, room) = (kind.to_lowercase(), room.to_lowercase());
-    let is_any = |text: &str, words: &[&str]| words.iter().any(|word| text.contains(word));
-    content.and_then(class_named).unwrap_or(match () {
-        () if kind.contains("floor") && is_any(&room, &WET) => MaterialClass::Tile,
-        () if kind.contains("floor") => MaterialClass::Wood,
-        () if is_any(&kind, &FITTINGS) => MaterialClass::Lacquer,
-        () => MaterialClass::Paint,
-    })
-}
-
 /// Texels of a class's block. Lookups stay in the middle half of the block, so that all four texels of a bilinear
 /// lookup belong to it, also a little beyond a triangle's edge.
 pub(super) const BLOCK: usize = 4;
@@ -209,7 +205,6 @@ pub(super) const BLOCK: usize = 4;
 /// The most units of u over which a model's uv may spread. Beyond them a shifted u would lose precision.
 const MOST_SPREAD: f32 = 64.0;
 
-/// The classes of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Finish {
     /// The distinct classes; each has a block of the texture, in this order.

@@ -29,7 +29,5 @@ pub(crate) mod tests;
 
 pub use document::{HouseError, Limits};
 pub use furnish::{FurnishedHouse, HouseFiles, PlacedModel, PlacedSurface, furnish, read_house};
-pub use house::{
-    Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
-};
+pub use house::{Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Room};
 pub use material_class::AppearanceRule;

@@ -162,7 +162,6 @@ const CEILING: f32 = 0.8;
 const LAMP: f32 = 7.0;
 /// The name of the environment's light group.
 const WORLD_NAME: &str = "world";
-/// Radiance of the environment.
 const WORLD: f32 = 0.05;
 
 /// Whether and how a surface emits.

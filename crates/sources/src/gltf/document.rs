@@ -13,13 +13,12 @@ use serde_json::Value;
 
 use crate::source_scene::JsonSize;
 
-/// Upper bounds. The file is refused where its JSON or its buffers exceed them; anything else is left out, which is a
+/// Limits on an untrusted glTF, checked before memory is taken. The file is refused where its JSON or its buffers exceed them; anything else is left out, which is a
 /// finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of the glTF, of any other file, and of all buffers together.
     pub file_bytes: u64,
-    /// Bytes of the JSON.
     pub json_bytes: usize,
     /// Values in the JSON: numbers, texts, lists, objects.
     pub json_values: usize,
@@ -59,79 +58,42 @@ impl Default for Limits {
 /// Why a file is not a glTF scene that can be read.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfSceneError {
-    /// The JSON is too large.
     #[error(
         "expected JSON of at most {most_bytes} bytes, {most_values} values and {most_containers} lists and objects, found \
          {bytes}, {values} and {containers}"
     )]
     TooLarge {
-        /// Bytes of the JSON.
         bytes: usize,
-        /// Its values.
         values: usize,
-        /// Its lists and objects.
         containers: usize,
-        /// The most bytes allowed.
         most_bytes: usize,
-        /// The most values allowed.
         most_values: usize,
-        /// The most lists and objects allowed.
         most_containers: usize,
     },
     /// The file cannot be read without an extension that is not supported, such as a compression of meshes.
     #[error("/extensionsRequired: '{name}' is not supported; {way_out}")]
-    RequiredExtension {
-        /// The extension's name, shortened.
-        name: String,
-        /// What to do.
-        way_out: &'static str,
-    },
+    RequiredExtension { name: String, way_out: &'static str },
     /// A mesh or a buffer view exists in a compressed form alone, which is not supported.
     #[error("{pointer}: its data are compressed ('{name}'), which is not supported; {way_out}")]
-    OnlyCompressed {
-        /// The primitive or buffer view.
-        pointer: String,
-        /// The extension's name.
-        name: &'static str,
-        /// What to do.
-        way_out: &'static str,
-    },
+    OnlyCompressed { pointer: String, name: &'static str, way_out: &'static str },
     /// The file breaks the rules of glTF.
     #[error("{pointer}: {reason}{}", and_more(*others))]
     NotValid {
         /// The first place that breaks them.
         pointer: String,
-        /// How it breaks them.
         reason: validation::Error,
-        /// The number of further places.
         others: usize,
     },
-    /// The file is not glTF.
     #[error(transparent)]
     NotGltf(GltfError),
-    /// The file has no scene.
     #[error("/scenes: expected a scene, found none")]
     NoScene,
-    /// The bytes of a buffer cannot be had.
     #[error("/buffers/{buffer}/uri: {reason}")]
-    Buffer {
-        /// The buffer.
-        buffer: usize,
-        /// Why not.
-        reason: FileFault,
-    },
-    /// A buffer without a file is not the binary part of a .glb.
+    Buffer { buffer: usize, reason: FileFault },
     #[error("/buffers/{buffer}: expected a `uri`, or a .glb with a binary part")]
-    BufferWithoutData {
-        /// The buffer.
-        buffer: usize,
-    },
-    /// The buffers are too large.
+    BufferWithoutData { buffer: usize },
     #[error("/buffers: expected at most {most} bytes together, found more")]
-    BuffersTooLarge {
-        /// The most bytes allowed.
-        most: u64,
-    },
+    BuffersTooLarge { most: u64 },
 }
 
 impl From<GltfError> for GltfSceneError {

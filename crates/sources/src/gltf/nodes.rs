@@ -68,15 +68,8 @@ enum PrimitiveFault {
     /// An accessor cannot be read, or its content is not what is wanted.
     #[error(transparent)]
     Accessor(#[from] GltfError),
-    /// The scene would exceed the limits.
     #[error("the scene has more than {triangles} triangles or {vertices} vertices")]
-    TooLarge {
-        /// The most triangles allowed.
-        triangles: usize,
-        /// The most vertices allowed.
-        vertices: usize,
-    },
-    /// The primitive consists of points or lines.
+    TooLarge { triangles: usize, vertices: usize },
     #[error("points or lines")]
     NotASurface,
 }

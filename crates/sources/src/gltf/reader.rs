@@ -12,7 +12,6 @@ use mateval_scene::source_folder::SourceFolder;
 use super::document::Limits;
 use crate::source_scene::{InstanceOrigin, Log, UniqueNames};
 
-/// A scene under construction.
 pub(super) struct Reader<'a> {
     pub(super) file: &'a GltfFile,
     pub(super) buffers: &'a [Vec<u8>],
@@ -72,7 +71,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// A material that was read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ReadMaterial {
     pub(super) index: MaterialIndex,
@@ -80,18 +78,15 @@ pub(super) struct ReadMaterial {
     pub(super) uv_set: Option<u32>,
     /// What the file states of it.
     pub(super) stated: StatedParameters,
-    /// Its emission, if it emits.
     pub(super) glow: Option<Glow>,
 }
 
-/// The emission of a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Glow {
     /// Linear Rec. 709 radiance.
     pub(super) radiance: [f32; 3],
     /// The texture that multiplies it.
     pub(super) map: Option<EmissionMap>,
-    /// Whether the back emits too.
     pub(super) two_sided: bool,
 }
 
@@ -122,7 +117,6 @@ pub(super) struct Occurrences {
     count: usize,
     /// The JSON pointer of the first.
     first: String,
-    /// What was done instead.
     action: String,
 }
 

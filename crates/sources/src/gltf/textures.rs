@@ -17,8 +17,8 @@ use mateval_scene::source_folder::FileFault;
 use super::document::read_uri;
 use super::reader::{Aspect, Omission, Reader};
 use crate::missing_uv::mean_color;
+use crate::source_scene::picture_fault;
 
-/// A texture of a material.
 #[derive(Clone)]
 pub(super) struct Lookup<'a> {
     pub(super) texture: gltf::Texture<'a>,
@@ -71,7 +71,6 @@ const MISSING: f32 = 0.5;
 /// The first bytes of the picture formats that glTF allows, and of WebP.
 const SIGNATURES: [&[u8]; 3] = [b"\x89PNG", b"\xff\xd8\xff", b"RIFF"];
 
-/// A decoded image.
 pub(super) struct Decoded {
     name: String,
     sha256: String,
@@ -174,7 +173,7 @@ impl Reader<'_> {
                     opacity(alpha, wrap, |alpha| if alpha * factor >= cutoff { 1.0 } else { 0.0 })
                 }
             };
-            let texture = texture.map_err(|error| picture_fault(&error))?;
+            let texture = texture.map_err(|error| picture_fault("bad_image", &error))?;
             Ok(SourceTexture { name, sha256: Some(sha256), texture })
         });
         match loaded {
@@ -230,23 +229,13 @@ impl Reader<'_> {
         let own_name = || image.name().map(shortened).unwrap_or_else(|| format!("image {}", image.index()));
         let name = file.unwrap_or_else(own_name);
         let read = texture_and_alpha_of_bytes(Path::new(&name), bytes, encoding, wrap);
-        let (color, alpha) = read.map_err(|error| picture_fault(&error))?;
+        let (color, alpha) = read.map_err(|error| picture_fault("bad_image", &error))?;
         self.texels = self.texels.saturating_add(color.width() * color.height());
         if self.texels > self.limits.texels {
             return Err(limit(self.limits.texels));
         }
         Ok(Decoded { name, sha256, color, alpha })
     }
-}
-
-/// The fault of a picture, without its path, which the finding names.
-fn picture_fault(error: &ImageError) -> FileFault {
-    let message = match error {
-        ImageError::Io { source, .. } => source.to_string(),
-        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
-        ImageError::PixelCount { .. } => error.to_string(),
-    };
-    FileFault { code: "bad_image", message }
 }
 
 /// The texture times a linear factor; the texture itself where that is 1.
