@@ -342,7 +342,7 @@ enum StepError {
     UpAlongView,
 }
 
-/// The product of a transform's steps. A transform with a faulty step gives none and is a finding with this `action`: without
+/// The product of a transform's steps, each applied after those before it. A transform with a faulty step gives none and is a finding with this `action`: without
 /// that step, it would put its object elsewhere.
 pub(super) fn read_transform(transform: &Element, place: &str, action: &str, log: &mut Log) -> Option<DMat4> {
     if transform.tag != "transform" {

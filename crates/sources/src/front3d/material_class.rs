@@ -17,7 +17,7 @@ use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::material::UvTransform;
 use mateval_scene::material_class::MaterialClass;
 
-/// How roughness and metallic are chosen.
+/// How the roughness and metallic of a house are chosen, since the data states neither.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AppearanceRule {
     /// Roughness 0.5 and metallic 0 everywhere, as in BlenderProc.

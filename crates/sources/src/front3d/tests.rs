@@ -1,7 +1,6 @@
 //! Tests the reader on the built-in house with faults, on generated houses, on hostile files, and on real data if it
 //! exists.
 
-mod cameras;
 mod hostile;
 mod houses;
 mod models;
