@@ -5,20 +5,10 @@ use std::path::{Component, Path, PathBuf};
 /// Why a path is not below the source's folder.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BelowError {
-    /// A relative path leads out of the folder.
     #[error("'{}' leads out of the source's folder", path.display())]
-    LeadsOut {
-        /// The path.
-        path: PathBuf,
-    },
-    /// An absolute path lies elsewhere.
+    LeadsOut { path: PathBuf },
     #[error("'{}' does not lie below '{}'", path.display(), source_folder.display())]
-    Elsewhere {
-        /// The path.
-        path: PathBuf,
-        /// The source's folder.
-        source_folder: PathBuf,
-    },
+    Elsewhere { path: PathBuf, source_folder: PathBuf },
 }
 
 /// The path relative to `source`. Fails where it leads elsewhere. A relative path within the folder is returned unchanged

@@ -14,9 +14,7 @@ use mateval_scene::reference::{
     Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
 
-use crate::log::Log;
-use crate::mean_color::mean_color;
-use crate::source_scene::InstanceOrigin;
+use crate::source_scene::{InstanceOrigin, Log};
 
 /// The triangles that have no texture coordinates.
 fn triangles_without(mesh: &TriangleMesh) -> Vec<bool> {
@@ -126,7 +124,6 @@ impl Means {
         flat
     }
 
-    /// Makes a whole surface plain.
     fn flatten(&mut self, scene: &mut ReferenceScene, at: usize) {
         scene.surfaces[at].material = self.material(scene, scene.surfaces[at].material);
         scene.surfaces[at].mesh.uvs = None;
@@ -171,13 +168,25 @@ impl Means {
     }
 }
 
+/// The mean colour of a texture's texels, summed in f64.
+pub(crate) fn mean_color(texture: &Texture) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for y in 0..texture.height() {
+        for x in 0..texture.width() {
+            let texel = texture.texel(x, y);
+            sum.iter_mut().zip(texel).for_each(|(s, v)| *s += f64::from(v));
+        }
+    }
+    sum.map(|s| s / (texture.width() * texture.height()) as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use mateval_image::Wrap;
     use mateval_scene::material::{ColorInput, Material, MaterialModel, UvTransform};
 
     use super::*;
-    use crate::bitterli::primitives::rectangle;
+    use crate::primitives::rectangle;
 
     /// A square of two triangles under a texture of two texels, 0 and 1.
     fn scene(uvs: Option<Vec<Vec2>>) -> (ReferenceScene, Vec<InstanceOrigin>) {

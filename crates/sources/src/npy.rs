@@ -14,32 +14,14 @@ pub enum NpyError {
     /// The header is cut off, too long, or not that of a plain array.
     #[error(transparent)]
     Header(#[from] NpyHeaderError),
-    /// The library refused the array.
     #[error("expected a valid NumPy array: {reason}")]
-    Unsound {
-        /// The library's reason.
-        reason: std::io::Error,
-    },
-    /// The array has more than one axis whose length is not 1, or none.
+    Unsound { reason: std::io::Error },
     #[error("an array of shape ({}); expected (N,), (N, 1) or (1, N)", joined(shape))]
-    Shape {
-        /// The lengths of the axes.
-        shape: Vec<u64>,
-    },
-    /// The array does not hold integers.
+    Shape { shape: Vec<u64> },
     #[error("an array of {found}; expected integers, as in '<i8'")]
-    NotIntegers {
-        /// The description of its type.
-        found: String,
-    },
-    /// The data has another length than the header states.
+    NotIntegers { found: String },
     #[error("expected {expected} bytes of numbers, found {found}")]
-    Length {
-        /// Bytes that the numbers take.
-        expected: u64,
-        /// Bytes behind the header.
-        found: u64,
-    },
+    Length { expected: u64, found: u64 },
 }
 
 fn joined(shape: &[u64]) -> String {

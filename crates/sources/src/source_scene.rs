@@ -1,30 +1,28 @@
-//! The scene that every reader makes, and the opening of a source's main file.
+//! The scene that every reader makes, and what they all do while they make it: collect findings, name things apart, move
+//! far scenes near to the origin, and count the JSON before it is parsed.
 
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::error::{InvalidSource, SourceError};
-
-use glam::DVec3;
+use glam::{DMat4, DVec3};
+use mateval_image::ImageError;
 use mateval_scene::material::StatedParameters;
 use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::ReferenceScene;
-use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::{Camera, Finding, Role, SceneLights, SourceKind, TriangleMesh};
+use mateval_scene::source_folder::{FileFault, SourceFolder};
+use mateval_scene::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 
 /// A licence that must be passed on with the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LicenceText {
     /// The file's name in the scene's folder.
     pub file: String,
-    /// The file's text.
     pub text: String,
 }
 
 /// Facts about an instance besides its mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InstanceOrigin {
-    /// Its role in the scene.
     pub role: Role,
     /// Its category, as in `Dining Chair`.
     pub category: Option<String>,
@@ -43,7 +41,7 @@ pub struct InstanceOrigin {
 }
 
 /// The names of a licence beside a scene.
-pub(crate) const LICENCES: [&str; 3] = ["LICENSE.txt", "LICENSE", "license.txt"];
+const LICENCES: [&str; 3] = ["LICENSE.txt", "LICENSE", "license.txt"];
 
 /// Whether a scene that lacks this file lacks nothing.
 pub(crate) fn is_optional(file: &str) -> bool {
@@ -72,7 +70,6 @@ impl Missing {
 /// A scene read from any source.
 #[derive(Clone, Debug)]
 pub struct SourceScene {
-    /// The kind of source.
     pub kind: SourceKind,
     /// Whether the source describes the scene's lights.
     pub lights: SceneLights,
@@ -104,18 +101,200 @@ pub struct SourceScene {
     pub missing: Missing,
 }
 
-/// Reads the file at `path`, which may have at most `most` bytes. Returns its folder, its name and its bytes. Other files
-/// of the folder may have at most `file_bytes`.
-pub fn open(path: &Path, most: u64, file_bytes: u64) -> Result<(SourceFolder, String, Vec<u8>), SourceError> {
-    let io = |source| SourceError::Io { path: path.to_owned(), source };
-    let invalid = |reason| SourceError::invalid(path, reason);
-    let found = std::fs::metadata(path).map_err(io)?.len();
-    if found > most {
-        return Err(invalid(InvalidSource::TooLarge { most, found }));
+/// The licence beside the scene. A scene must not be passed on without it, so an unreadable licence is a finding.
+pub(crate) fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<LicenceText> {
+    let file = LICENCES.into_iter().find(|name| source.path(name).is_ok())?;
+    match source.read(file) {
+        Ok(bytes) => Some(LicenceText { file: file.to_owned(), text: String::from_utf8_lossy(&bytes).into_owned() }),
+        Err(fault) => {
+            let action = "left it out; copy it by hand";
+            log.push(Severity::Warning, fault.code, file, "", fault.message, action);
+            None
+        }
     }
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let name = name.ok_or_else(|| invalid(InvalidSource::NotAFile))?;
-    let mut folder = SourceFolder::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(io)?;
-    let bytes = folder.read(&name).map_err(|fault| invalid(InvalidSource::Unreadable(fault)))?;
-    Ok((folder, name, bytes))
+}
+
+/// The fault of a picture. Its message leaves out the path, which the finding gives.
+pub(crate) fn picture_fault(code: &'static str, error: &ImageError) -> FileFault {
+    let message = match error {
+        ImageError::Io { source, .. } => source.to_string(),
+        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
+        ImageError::PixelCount { .. } => error.to_string(),
+    };
+    FileFault { code, message }
+}
+
+/// A scene whose camera stands farther than this from the origin, in metres, is moved near to it before anything becomes
+/// f32. Scenes in map coordinates are.
+const NEAR_M: f64 = 1000.0;
+
+/// What is subtracted from the positions of a scene with its camera here: whole metres, or nothing near the origin.
+///
+/// The camera decides, since positions must be exact near it, and a far background does not matter.
+pub(crate) fn shift_of(camera: DVec3) -> DVec3 {
+    if camera.is_finite() && camera.length() > NEAR_M { camera.round() } else { DVec3::ZERO }
+}
+
+/// Reports a shift that is not zero.
+pub(crate) fn report_shift(shift: DVec3, log: &mut Log) {
+    if shift != DVec3::ZERO {
+        let [x, y, z] = shift.to_array();
+        let message =
+            format!("the scene lies {:.1} km from the origin, where 32 bits are too coarse", shift.length() / 1e3);
+        log.note("far_from_origin", "", message, format!("subtracted ({x}, {y}, {z}) m from all positions"));
+    }
+}
+
+/// The transform that subtracts a shift.
+pub(crate) fn shift_transform(shift: DVec3) -> DMat4 {
+    if shift == DVec3::ZERO { DMat4::IDENTITY } else { DMat4::from_translation(-shift) }
+}
+
+/// The findings of a scene that is being read, each once.
+#[derive(Debug)]
+pub struct Log {
+    file: String,
+    limit: usize,
+    findings: BTreeSet<Finding>,
+    dropped: usize,
+}
+
+impl Log {
+    /// An empty log. Findings refer to `file` by default. Findings beyond `limit` are only counted.
+    pub fn new(file: String, limit: usize) -> Self {
+        Self { file, limit, findings: BTreeSet::new(), dropped: 0 }
+    }
+
+    /// The file that findings refer to by default.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Reports that something was left out or replaced.
+    pub fn warn(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
+        let file = self.file.clone();
+        self.push(Severity::Warning, code, &file, place, message, action);
+    }
+
+    /// Reports that something was read differently from how it is written, without loss.
+    pub fn note(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
+        let file = self.file.clone();
+        self.push(Severity::Note, code, &file, place, message, action);
+    }
+
+    /// Reports a finding about another file.
+    pub fn push(
+        &mut self,
+        severity: Severity,
+        code: &str,
+        file: &str,
+        place: &str,
+        message: impl Into<String>,
+        action: impl Into<String>,
+    ) {
+        if self.findings.len() >= self.limit {
+            self.dropped += 1;
+            return;
+        }
+        self.findings.insert(Finding {
+            severity,
+            code: code.to_owned(),
+            file: file.to_owned(),
+            place: place.to_owned(),
+            message: message.into(),
+            action: action.into(),
+        });
+    }
+
+    /// All findings, sorted.
+    pub fn into_findings(mut self) -> Vec<Finding> {
+        if self.dropped > 0 {
+            let (file, message) = (self.file.clone(), format!("{} findings are not listed", self.dropped));
+            self.limit = usize::MAX;
+            self.push(Severity::Warning, "too_many_findings", &file, "", message, "only counted them");
+        }
+        self.findings.into_iter().collect()
+    }
+}
+
+/// The names given so far.
+#[derive(Debug, Default)]
+pub(crate) struct UniqueNames {
+    taken: BTreeSet<String>,
+    /// By name: the last number that was appended to it.
+    numbers: BTreeMap<String, usize>,
+}
+
+impl UniqueNames {
+    /// The name, with `-2`, `-3` and so on appended where it is taken.
+    pub(crate) fn unique(&mut self, name: String) -> String {
+        let mut unique = name.clone();
+        while !self.taken.insert(unique.clone()) {
+            let number = self.numbers.entry(name.clone()).or_insert(1);
+            *number += 1;
+            unique = format!("{name}-{number}");
+        }
+        unique
+    }
+}
+
+/// The number of values in a JSON text. It is counted before the text is parsed, since two bytes of text can take a hundred
+/// bytes of memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct JsonSize {
+    /// Commas and colons outside strings.
+    pub(crate) values: usize,
+    /// Lists and objects.
+    pub(crate) containers: usize,
+}
+
+impl JsonSize {
+    /// Counts the values of the text, which need not be valid.
+    pub(crate) fn of(text: &[u8]) -> Self {
+        let (mut size, mut in_text, mut escaped) = (Self::default(), false, false);
+        for byte in text {
+            if in_text {
+                in_text = escaped || *byte != b'"';
+                escaped = !escaped && *byte == b'\\';
+                continue;
+            }
+            match byte {
+                b'"' => in_text = true,
+                b',' | b':' => size.values += 1,
+                b'[' | b'{' => size.containers += 1,
+                _ => {}
+            }
+        }
+        size
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_far_scenes_are_moved_by_whole_metres() {
+        assert_eq!(shift_of(DVec3::new(900.5, 0.0, 0.0)), DVec3::ZERO);
+        assert_eq!(shift_of(DVec3::new(448_231.25, 120.125, -354_123.5)), DVec3::new(448_231.0, 120.0, -354_124.0));
+        assert_eq!(shift_of(DVec3::NAN), DVec3::ZERO);
+        assert_eq!(shift_transform(DVec3::ZERO), DMat4::IDENTITY);
+    }
+
+    #[test]
+    fn findings_are_sorted_unique_and_limited() {
+        let mut log = Log::new("scene.xml".into(), 2);
+        for code in ["b", "a", "b", "c", "d"] {
+            log.warn(code, "", "message", "action");
+        }
+        let codes: Vec<_> = log.into_findings().into_iter().map(|f| f.code).collect();
+        assert_eq!(codes, ["a", "b", "too_many_findings"]);
+    }
+
+    #[test]
+    fn later_names_are_numbered() {
+        let mut names = UniqueNames::default();
+        let given = ["lamp", "lamp-2", "lamp", "lamp"].map(|name| names.unique(name.to_owned()));
+        assert_eq!(given, ["lamp", "lamp-2", "lamp-3", "lamp-4"]);
+    }
 }

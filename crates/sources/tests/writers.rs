@@ -26,7 +26,7 @@ fn script(name: &str) -> PathBuf {
 fn written(command: &mut Command, out: &Path) -> GltfScene {
     let done = command.arg(out).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let scene = read(out, &Limits::default()).unwrap();
+    let scene = read(out, None, &Limits::default()).unwrap();
     for finding in &scene.findings {
         eprintln!("{}: {} {} {}", out.display(), finding.code, finding.place, finding.message);
     }

@@ -8,19 +8,14 @@ use mateval_image::file_kind::without_mark;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 
-use super::document::Element;
-use super::error::ValueError;
-use super::sun::{CIE_Y_INTEGRAL, black_body, rec709_from_xyz};
-use super::value;
+use super::document::{Element, ValueError};
+use super::reader::{number, number_within, numbers, triple};
 
-/// What a colour stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorUse {
     /// A share of light, from 0 to 1.
     Reflectance,
-    /// Radiance.
     Emission,
-    /// An index of refraction.
     Index,
 }
 
@@ -36,6 +31,9 @@ const STEPS: usize = 1000;
 pub(super) const MOST_REFLECTANCE: f64 = 1.001;
 /// Most pairs of a spectrum.
 const MOST_PAIRS: usize = 4096;
+
+/// The integral of the CIE 1931 y curve over nanometres, by which Mitsuba divides when it turns spectra into colours.
+pub(super) const CIE_Y_INTEGRAL: f64 = 106.856_980;
 
 /// The CIE 1931 colour matching functions of the 2 degree observer (CIE 015:2018, table 6), every 5 nm from 360 nm on.
 const OBSERVER: [[f64; 3]; SAMPLES] = [
@@ -159,16 +157,16 @@ pub(super) fn constant_color(
 ) -> Result<[f64; 3], ValueError> {
     let text = element.attribute("value").unwrap_or("").trim();
     match element.tag.as_str() {
-        "float" | "integer" => Ok([value::number(text)?; 3]),
+        "float" | "integer" => Ok([number(text)?; 3]),
         "rgb" if text.starts_with('#') => hex(text),
-        "rgb" => value::triple(text),
+        "rgb" => triple(text),
         "srgb" if text.starts_with('#') => hex(text),
-        "srgb" => Ok(value::triple(text)?.map(linear)),
+        "srgb" => Ok(triple(text)?.map(linear)),
         "blackbody" if usage == ColorUse::Reflectance => Err(ValueError::NotAReflectance),
         "blackbody" => {
             let kelvin = element.attribute("temperature").unwrap_or("").trim().trim_end_matches(['k', 'K']);
-            let scale = element.attribute("scale").map_or(Ok(1.0), value::number)?;
-            Ok(of_black_body(value::number_within(kelvin, 1.0, 1e6)?).map(|v| v * scale))
+            let scale = element.attribute("scale").map_or(Ok(1.0), number)?;
+            Ok(of_black_body(number_within(kelvin, 1.0, 1e6)?).map(|v| v * scale))
         }
         "spectrum" => spectrum(element, text, usage, major_version, folder),
         other => Err(ValueError::NotAColor { found: shortened(other) }),
@@ -203,10 +201,10 @@ fn spectrum(
     let needed = |name: &'static str| child(name).ok_or(ValueError::Missing { name });
     match element.kind() {
         "" => {}
-        "uniform" => return Ok([value::number(needed("value")?)?; 3]),
-        "d65" => return Ok([child("scale").map_or(Ok(1.0), value::number)?; 3]),
+        "uniform" => return Ok([number(needed("value")?)?; 3]),
+        "d65" => return Ok([child("scale").map_or(Ok(1.0), number)?; 3]),
         "blackbody" if usage == ColorUse::Reflectance => return Err(ValueError::NotAReflectance),
-        "blackbody" => return Ok(of_black_body(value::number_within(needed("temperature")?, 1.0, 1e6)?)),
+        "blackbody" => return Ok(of_black_body(number_within(needed("temperature")?, 1.0, 1e6)?)),
         "irregular" => {
             let (wavelengths, values) = (many(needed("wavelengths")?)?, many(needed("values")?)?);
             if wavelengths.len() != values.len() {
@@ -215,7 +213,7 @@ fn spectrum(
             return integrated(&wavelengths.into_iter().zip(values).collect::<Vec<_>>(), usage);
         }
         "regular" => {
-            let (least, most) = (value::number(needed("wavelength_min")?)?, value::number(needed("wavelength_max")?)?);
+            let (least, most) = (number(needed("wavelength_min")?)?, number(needed("wavelength_max")?)?);
             let values = many(needed("values")?)?;
             let last = values.len().saturating_sub(1).max(1) as f64;
             let pair = |(at, value): (usize, f64)| (least + (most - least) * at as f64 / last, value);
@@ -245,7 +243,7 @@ fn spectrum(
         let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
         let pair = |word: &str| {
             let (wavelength, value) = word.split_once(':').ok_or(ValueError::NotAPair { found: shortened(word) })?;
-            Ok((value::number(wavelength)?, value::number(value)?))
+            Ok((number(wavelength)?, number(value)?))
         };
         let pairs = words.take(MOST_PAIRS + 1).map(pair).collect::<Result<Vec<_>, ValueError>>()?;
         return if pairs.len() > MOST_PAIRS {
@@ -255,17 +253,17 @@ fn spectrum(
         };
     }
     // One value is the same at all wavelengths, which Mitsuba 2 and 3 do not take for white where it emits.
-    match value::numbers(text)?[..] {
+    match numbers(text)?[..] {
         [one] if usage == ColorUse::Emission && major_version >= 2 => {
             integrated(&[(FIRST_NM, one), (FIRST_NM + STEP_NM * (SAMPLES - 1) as f64, one)], usage)
         }
-        _ => value::triple(text),
+        _ => triple(text),
     }
 }
 
 fn many(text: &str) -> Result<Vec<f64>, ValueError> {
     let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
-    let list = words.take(MOST_PAIRS + 1).map(value::number).collect::<Result<Vec<_>, _>>()?;
+    let list = words.take(MOST_PAIRS + 1).map(number).collect::<Result<Vec<_>, _>>()?;
     if list.len() > MOST_PAIRS { Err(ValueError::TooManyNumbers { most: MOST_PAIRS }) } else { Ok(list) }
 }
 
@@ -324,11 +322,28 @@ fn of_black_body(kelvin: f64) -> [f64; 3] {
     rec709_from_xyz(xyz).map(|v| v.max(0.0))
 }
 
+/// Planck's law at a temperature in kelvin: W/(m^2 sr nm).
+pub(super) fn black_body(nanometres: f64, kelvin: f64) -> f64 {
+    const TWO_H_C2: f64 = 1.191_042_97e-16;
+    const H_C_OVER_K: f64 = 0.014_387_769;
+    let metres = nanometres * 1e-9;
+    TWO_H_C2 / (libm::pow(metres, 5.0) * (libm::exp(H_C_OVER_K / (metres * kelvin)) - 1.0)) * 1e-9
+}
+
+/// The matrix of IEC 61966-2-1.
+pub(super) fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [
+        3.240_479 * x - 1.537_150 * y - 0.498_535 * z,
+        -0.969_256 * x + 1.875_991 * y + 0.041_556 * z,
+        0.055_648 * x - 0.204_043 * y + 1.057_311 * z,
+    ]
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::document::Document;
     use super::*;
-    use crate::log::Log;
+    use crate::bitterli::document::Document;
+    use crate::source_scene::Log;
 
     fn color(element: &str, usage: ColorUse) -> Result<[f64; 3], ValueError> {
         let folder = tempfile::tempdir().unwrap();

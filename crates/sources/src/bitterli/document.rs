@@ -3,14 +3,109 @@
 
 use std::collections::BTreeMap;
 
-use super::error::BitterliError;
-use super::limits::Limits;
-use crate::log::Log;
 use mateval_image::file_kind::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 
-/// One XML element.
+use crate::source_scene::Log;
+
+/// Limits on an untrusted scene, checked before memory is taken. Exceeding one is an error for the XML itself, and a finding for anything else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of the XML, before and after variables are substituted.
+    pub xml_bytes: u64,
+    pub xml_depth: usize,
+    /// Bytes of any other file.
+    pub file_bytes: u64,
+    /// Bytes of all OBJ files, each counted as often as it is named. Once exceeded, no further file is read.
+    pub mesh_bytes: u64,
+    pub shapes: usize,
+    /// Triangles of all shapes.
+    pub triangles: usize,
+    /// Vertices of all shapes.
+    pub vertices: usize,
+    /// Texels of all textures.
+    pub texels: usize,
+    /// Number of findings. Further ones are only counted.
+    pub findings: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            xml_bytes: 64 << 20,
+            xml_depth: 64,
+            file_bytes: 512 << 20,
+            mesh_bytes: 4 << 30,
+            shapes: 100_000,
+            triangles: 50_000_000,
+            vertices: 50_000_000,
+            texels: 512 << 20,
+            findings: 5_000,
+        }
+    }
+}
+
+/// Why XML is not a Mitsuba scene, has no usable camera, or exceeds a limit.
+#[derive(Debug, thiserror::Error)]
+pub enum BitterliError {
+    #[error("expected well-formed XML: {reason}")]
+    NotXml { reason: roxmltree::Error },
+    #[error("line {line}: expected elements nested at most {most} deep, found deeper ones")]
+    TooDeep { line: usize, most: usize },
+    #[error("line {line}: the scene with its variables substituted is too large")]
+    TooLarge { line: usize },
+    #[error("expected a Mitsuba scene, whose root element is <scene>, found <{found}>")]
+    NotAScene { found: String },
+    #[error("expected a <sensor>, found none")]
+    NoSensor,
+    #[error("line {line}: the sensor '{kind}' is not supported; expected 'perspective' (a pinhole camera)")]
+    OtherSensor { line: usize, kind: String },
+    #[error("line {line}: <include>: {reason}")]
+    Include { line: usize, reason: String },
+    #[error("line {line}: focal_length of the sensor: {reason}")]
+    FocalLength { line: usize, reason: ValueError },
+    #[error("line {line}: expected a readable to_world of the sensor, found one with a faulty step")]
+    SensorTransform { line: usize },
+    #[error("line {line}: expected an invertible to_world of the sensor, found a singular one")]
+    SingularSensor { line: usize },
+}
+
+/// Why the text of a parameter is not the value that is wanted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ValueError {
+    #[error("expected a finite number, found '{found}'")]
+    NotANumber { found: String },
+    #[error("expected {least} to {most}, found {found}")]
+    OutOfRange { least: f64, most: f64, found: f64 },
+    #[error("expected a number above 0, found {found}")]
+    NotPositive { found: f64 },
+    #[error("expected {expected} numbers, found {found}")]
+    Count {
+        /// The lengths allowed, as in `1 or 3`.
+        expected: &'static str,
+        found: usize,
+    },
+    #[error("expected at most {most} numbers, found more")]
+    TooManyNumbers { most: usize },
+    #[error("expected true or false, found '{found}'")]
+    NotABoolean { found: String },
+    #[error("expected # and six hexadecimal digits, found '{found}'")]
+    NotHex { found: String },
+    #[error("expected wavelength:value, found '{found}'")]
+    NotAPair { found: String },
+    #[error("expected two or more wavelengths, each above the one before")]
+    NotASpectrum,
+    #[error("expected '{name}', found none")]
+    Missing { name: &'static str },
+    #[error("{reason}")]
+    File { reason: String },
+    #[error("expected a reflectance, found the emission of a black body")]
+    NotAReflectance,
+    #[error("expected a colour, found <{found}>")]
+    NotAColor { found: String },
+}
+
 #[derive(Debug)]
 pub(super) struct Element {
     /// The tag, with `lookAt` and `look_at` written `lookat`.
@@ -27,7 +122,6 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// The value of an attribute.
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
@@ -57,7 +151,6 @@ impl Element {
 /// A scene file.
 #[derive(Debug)]
 pub(super) struct Document {
-    /// The `<scene>`.
     pub(super) root: Element,
     /// The first number of the scene's version: 0 for Mitsuba 0.5 and 0.6, 3 for Mitsuba 3.
     pub(super) major_version: u32,
@@ -80,7 +173,16 @@ impl Document {
     ) -> Result<Self, BitterliError> {
         check_depth(text, limits.xml_depth)?;
         let xml = roxmltree::Document::parse(text).map_err(|reason| BitterliError::NotXml { reason })?;
-        let mut builder = Builder::new(text, limits, folder, log);
+        let mut builder = Builder {
+            line_starts: line_starts(text),
+            variables: BTreeMap::new(),
+            budget: limits.xml_bytes,
+            depth_limit: limits.xml_depth,
+            serial: 0,
+            files: Vec::new(),
+            folder,
+            log,
+        };
         let root = builder.element(xml.root_element(), 0)?;
         if root.tag != "scene" {
             return Err(BitterliError::NotAScene { found: shortened(&root.tag) });
@@ -218,20 +320,7 @@ fn line_starts(text: &str) -> Vec<usize> {
     std::iter::once(0).chain(ends).collect()
 }
 
-impl<'l> Builder<'l> {
-    fn new(text: &str, limits: &Limits, folder: &'l mut SourceFolder, log: &'l mut Log) -> Self {
-        Self {
-            line_starts: line_starts(text),
-            variables: BTreeMap::new(),
-            budget: limits.xml_bytes,
-            depth_limit: limits.xml_depth,
-            serial: 0,
-            files: Vec::new(),
-            folder,
-            log,
-        }
-    }
-
+impl Builder<'_> {
     fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Element, BitterliError> {
         let line = self.line_starts.partition_point(|&start| start <= node.range().start);
         if depth > self.depth_limit {
@@ -343,7 +432,7 @@ impl<'l> Builder<'l> {
 }
 
 /// `diffuseReflectance` as `diffuse_reflectance`. A name in snake_case is returned unchanged.
-pub(super) fn snake_case(name: &str) -> String {
+fn snake_case(name: &str) -> String {
     let mut out = String::with_capacity(name.len() + 4);
     let mut after_small = false;
     for c in name.chars() {

@@ -5,58 +5,39 @@
 //! scene to read or no camera to look through.
 //!
 //! `document` parses the XML into a tree: it checks depth and size, substitutes variables and writes names in snake_case.
-//! `parameters` hands a plugin the parameters it knows and reports the others. Each kind of plugin has its own file:
-//! `sensor`, `shape` (with `primitives`), `bsdf` (with `bsdf_model` and `ior`), `texture`, and `emitter` (with `sun_sky`
-//! and `sun`). Where Mitsuba's documentation is silent, the reader does what Mitsuba 3.9.1 does; the tests cite its
-//! results.
+//! `reader` hands a plugin the parameters it knows and reports the others. Each kind of plugin has its own file: `sensor`,
+//! `shape`, `bsdf`, `texture` (with `color`) and `emitter`. Where Mitsuba's documentation is silent, the reader does what
+//! Mitsuba 3.9.1 does; the tests cite its results.
 
 mod bsdf;
-mod bsdf_model;
 mod color;
 mod document;
 mod emitter;
-mod error;
-mod ior;
-mod limits;
-mod parameters;
-pub mod primitives;
 mod reader;
 mod sensor;
 mod shape;
-mod sun;
-mod sun_sky;
 #[cfg(test)]
 pub(crate) mod tests;
-#[cfg(test)]
-mod tests_real;
 mod texture;
-mod texture_key;
-mod transform;
-mod value;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
+use mateval_image::file_kind::{hint, without_mark};
+use mateval_scene::findings::shortened;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
 use crate::coincident;
-use crate::error::{InvalidSource, SourceError};
-use crate::licence::read_licence;
-use crate::log::Log;
-use crate::shift::{self, shift_of};
-use crate::source_scene::{InstanceOrigin, LicenceText, Missing, is_optional};
-use crate::unique_names::UniqueNames;
+use crate::error::{InvalidSource, SourceError, open};
+use crate::source_scene::{
+    InstanceOrigin, LicenceText, Log, Missing, UniqueNames, is_optional, read_licence, report_shift, shift_of,
+};
 use document::Document;
-pub use error::{BitterliError, ValueError};
-pub use limits::Limits;
-use mateval_image::file_kind::{hint, without_mark};
-use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::SourceFolder;
+pub use document::{BitterliError, Limits, ValueError};
 use reader::{Reader, Totals};
 
-/// A scene of Bitterli's resources.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BitterliScene {
     /// Name and author from the licence, as in `'Modern Hall' by NewSee2l035`, or else the folder's name.
@@ -88,9 +69,11 @@ pub struct BitterliScene {
 pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<BitterliScene, SourceError> {
     // The XML as a tree.
     let invalid = |error| SourceError::invalid(xml_path, InvalidSource::Bitterli(error));
-    let (mut source, name, text) = read_xml_file(xml_path, limits)?;
+    let (mut source, name, bytes) = open(xml_path, limits.xml_bytes, limits.file_bytes)?;
+    let text = std::str::from_utf8(without_mark(&bytes))
+        .map_err(|_| SourceError::invalid(xml_path, InvalidSource::NotUtf8 { hint: hint(&bytes).into_owned() }))?;
     let mut log = Log::new(name, limits.findings);
-    let document = Document::parse(&text, limits, &mut source, &mut log).map_err(invalid)?;
+    let document = Document::parse(text, limits, &mut source, &mut log).map_err(invalid)?;
     let ids = document.ids(&mut log);
     let licence = read_licence(&mut source, &mut log);
     // The scene.
@@ -147,13 +130,6 @@ fn missing(document: &Document, left_out: Vec<String>, absent: &[String]) -> Mis
     Missing { what: "shapes and textures", wanted, files: [left_out, pictures].concat() }
 }
 
-fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
-    let (source, name, bytes) = crate::source_scene::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
-    let not_utf8 = |_| InvalidSource::NotUtf8 { hint: hint(&bytes).into_owned() };
-    let text = std::str::from_utf8(without_mark(&bytes)).map_err(|e| SourceError::invalid(xml_path, not_utf8(e)))?;
-    Ok((source, name, text.to_owned()))
-}
-
 fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
     let first = licence.and_then(|licence| licence.text.lines().next()).unwrap_or("");
     let named = first.split_once("version of ").map(|(_, rest)| rest.split(',').next().unwrap_or(rest).trim());
@@ -178,7 +154,7 @@ fn read_elements<'a>(
     let sensor = elements().find(|element| element.tag == "sensor").ok_or(BitterliError::NoSensor)?;
     let camera = reader.sensor(sensor)?;
     reader.shift_m = shift_of(place.unwrap_or(camera.position()));
-    shift::report(reader.shift_m, &mut reader.log);
+    report_shift(reader.shift_m, &mut reader.log);
     let mut shapes = 0;
     for element in &document.root.children {
         match element.tag.as_str() {

@@ -1,15 +1,12 @@
 //! Sensors. Mitsuba's camera looks along +z with +x to the left, MatEval's along -z with +x to the right.
 
 use glam::{DMat3, DMat4, DVec3};
+use mateval_scene::findings::shortened;
 use mateval_scene::{Camera, Intrinsics};
 
-use super::document::Element;
-use super::error::{BitterliError, ValueError};
-use super::parameters::Parameters;
-use super::reader::Reader;
-use super::value;
-use crate::log::Log;
-use mateval_scene::findings::shortened;
+use super::document::{BitterliError, Element, ValueError};
+use super::reader::{Parameters, Reader, number};
+use crate::source_scene::Log;
 
 /// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six digits.
 const SKEW_WITHOUT_FINDING: f64 = 1e-4;
@@ -124,7 +121,7 @@ impl<'a> Reader<'a> {
 
 /// A focal length as in `50mm`.
 fn millimetres(text: &str) -> Result<f64, ValueError> {
-    let found = value::number(text.trim().trim_end_matches("mm"))?;
+    let found = number(text.trim().trim_end_matches("mm"))?;
     if found > 0.0 { Ok(found) } else { Err(ValueError::NotPositive { found }) }
 }
 
@@ -164,8 +161,8 @@ fn camera(world_from_sensor: DMat4, intrinsics: Intrinsics, place: &str, log: &m
 mod tests {
     use glam::DVec2;
 
-    use super::super::tests::read_xml;
     use super::*;
+    use crate::bitterli::tests::read_xml;
 
     fn sensor_camera(parameters: &str, film: &str) -> (Camera, Vec<String>) {
         let film = format!("<integer name='width' value='100'/><integer name='height' value='50'/>{film}");

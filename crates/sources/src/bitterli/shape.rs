@@ -2,19 +2,18 @@
 
 use glam::{DMat3, DMat4, DVec3, Vec2};
 use mateval_scene::TriangleMesh;
+use mateval_scene::findings::shortened;
 use mateval_scene::material::StatedParameters;
+use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
+use mateval_scene::source_folder::FileFault;
 
 use super::document::Element;
-use super::parameters::Parameters;
-use super::primitives;
-use super::reader::Reader;
+use super::reader::{Parameters, Reader};
 use crate::missing_uv::barycentric;
-use crate::shift::{self, shift_of};
+use crate::primitives;
+use crate::source_scene::{shift_of, shift_transform};
 use crate::surface_mesh::{smooth_normals, to_world};
-use mateval_scene::findings::shortened;
-use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
-use mateval_scene::source_folder::FileFault;
 
 const LEFT_OUT: &str = "left the shape out";
 
@@ -27,7 +26,7 @@ impl<'a> Reader<'a> {
         self.report_medium(element, &mut from);
         let world_from_object = from
             .sound_transform("to_world", LEFT_OUT, &mut self.log)
-            .map(|world_from_object| shift::transform(self.shift_m) * world_from_object);
+            .map(|world_from_object| shift_transform(self.shift_m) * world_from_object);
         let flip = from.boolean("flip_normals", false, &mut self.log);
         let (bsdfs, emitters) = (from.objects("bsdf"), from.objects("emitter"));
         // The material of a shape that is left out is read too, so that its faults are reported.

@@ -1,17 +1,16 @@
 //! Colour and number parameters: constants, or bitmaps read from files.
 
 use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
-use mateval_image::{ImageError, Texels, Texture, Wrap};
+use mateval_image::{Texels, Texture, Wrap};
+use mateval_scene::findings::shortened;
 use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;
+use mateval_scene::source_folder::FileFault;
 
 use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;
-use super::parameters::Parameters;
-use super::reader::Reader;
-use super::texture_key::{Aspect, TextureKey};
-use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::FileFault;
+use super::reader::{Aspect, Parameters, Reader};
+use crate::source_scene::picture_fault;
 
 /// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
@@ -92,12 +91,14 @@ impl<'a> Reader<'a> {
         self.scalar_texture(element, &from.place, true)
     }
 
-    /// The luminance of a texture as heights; none where it cannot be read.
-    pub(super) fn height(&mut self, element: &'a Element, place: &str) -> Option<ScalarInput> {
-        self.scalar_texture(element, place, false)
-    }
-
-    fn scalar_texture(&mut self, element: &'a Element, place: &str, prefer_alpha: bool) -> Option<ScalarInput> {
+    /// A number from a texture: its alpha where `prefer_alpha` holds and that is not 1 everywhere, else its luminance. None
+    /// where it cannot be read.
+    pub(super) fn scalar_texture(
+        &mut self,
+        element: &'a Element,
+        place: &str,
+        prefer_alpha: bool,
+    ) -> Option<ScalarInput> {
         let bitmap = self.bitmap(element, place)?;
         let (aspect, channel) = match bitmap.channel {
             Some('a') => (Aspect::Alpha, 0),
@@ -235,7 +236,7 @@ impl<'a> Reader<'a> {
 
     /// Reads a texture, unless it has been read before. A fault of its file is reported once.
     fn texture(&mut self, bitmap: &Bitmap, aspect: Aspect) -> Option<TextureIndex> {
-        let key = TextureKey::new(&bitmap.file, bitmap.linear, bitmap.wrap, aspect);
+        let key = (bitmap.file.clone(), bitmap.linear, bitmap.wrap as u8, aspect);
         if let Some(known) = self.textures.get(&key) {
             return *known;
         }
@@ -274,10 +275,16 @@ impl<'a> Reader<'a> {
         self.source.read(file)?;
         let encoding = if linear { Encoding::Linear } else { Encoding::Srgb };
         let texture = if alpha { read_alpha(&path, wrap) } else { read_texture(&path, encoding, wrap).map(Some) };
-        let texture = texture.map_err(|error| picture_fault(file, &error))?.ok_or_else(|| FileFault {
-            code: "bad_value",
-            message: format!("'{}' has no alpha channel", shortened(file)),
-        })?;
+        let texture = texture
+            .map_err(|error| {
+                // Without the folders of this machine.
+                let FileFault { code, message } = picture_fault("unreadable_texture", &error);
+                FileFault { code, message: format!("'{}': {message}", shortened(file)) }
+            })?
+            .ok_or_else(|| FileFault {
+                code: "bad_value",
+                message: format!("'{}' has no alpha channel", shortened(file)),
+            })?;
         let total = self.texels.saturating_add(texture.width().saturating_mul(texture.height()));
         if total > self.limits.texels {
             let message = format!("all textures together have more than {} texels", self.limits.texels);
@@ -289,16 +296,6 @@ impl<'a> Reader<'a> {
 }
 
 const TEXTURE_LEFT_OUT: &str = "used linear mid-grey 0.5; as opacity or bump map, nothing";
-
-/// The fault of a picture. Its message names the file relative to the scene, without the folders of this machine.
-fn picture_fault(file: &str, error: &ImageError) -> FileFault {
-    let what = match error {
-        ImageError::Io { source, .. } => source.to_string(),
-        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
-        ImageError::PixelCount { .. } => error.to_string(),
-    };
-    FileFault { code: "unreadable_texture", message: format!("'{}': {what}", shortened(file)) }
-}
 
 /// The luminance of a linear colour by Mitsuba's own weights, which have more digits than those of Rec. 709.
 pub(super) fn luminance(rgb: [f32; 3]) -> f32 {

@@ -4,22 +4,20 @@ use std::collections::BTreeMap;
 
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::linear_from_srgb;
-use mateval_image::{ImageError, Texels, Texture, Wrap};
+use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::Severity;
+use mateval_scene::findings::shortened;
 use mateval_scene::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
 use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::{MaterialIndex, SourceTexture};
-
-use super::appearance_rule::AppearanceRule;
-use super::class_table;
-use super::finish::{BLOCK, Finish};
-use super::house::{House, HouseMaterial};
-use super::model::{Library, is_folder_name};
-use crate::log::Log;
-use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::FileFault;
+
+use super::house::{House, HouseMaterial};
+use super::material_class::{AppearanceRule, BLOCK, Finish, drawn};
+use super::model::{Library, is_folder_name};
+use crate::source_scene::{Log, picture_fault};
 
 /// Linear mid-grey, which replaces a colour or texture that cannot be read.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
@@ -166,7 +164,8 @@ impl Appearances {
         let code = |code| if code == "missing_file" { "missing_texture" } else { code };
         library.folder.read(relative).map_err(|fault| FileFault { code: code(fault.code), ..fault })?;
         let path = library.folder.path(relative)?;
-        let texture = read_texture(&path, Encoding::Srgb, Wrap::Repeat).map_err(|error| picture_fault(&error))?;
+        let texture = read_texture(&path, Encoding::Srgb, Wrap::Repeat)
+            .map_err(|error| picture_fault("unreadable_texture", &error))?;
         self.texels = self.texels.saturating_add(texture.width() * texture.height());
         if self.texels > self.most_texels {
             let message = format!("all textures together have more than {} texels", self.most_texels);
@@ -181,9 +180,7 @@ impl Appearances {
     fn numbers(&mut self, id: &str, classes: &[MaterialClass], uv: Option<UvTransform>) -> [ScalarInput; 2] {
         let drawn: Vec<[f32; 2]> = match self.rule {
             AppearanceRule::Constant => vec![[ROUGHNESS, METALLIC]],
-            AppearanceRule::Stated { seed } => {
-                classes.iter().map(|class| class_table::drawn(*class, id, seed)).collect()
-            }
+            AppearanceRule::Stated { seed } => classes.iter().map(|class| drawn(*class, id, seed)).collect(),
         };
         if let [one] = drawn[..] {
             return one.map(ScalarInput::Constant);
@@ -221,14 +218,4 @@ impl Appearances {
             log.warn("no_textures", "/material", message, "used their colours");
         }
     }
-}
-
-/// The fault of a picture. Its message leaves out the path, which the finding gives.
-fn picture_fault(error: &ImageError) -> FileFault {
-    let message = match error {
-        ImageError::Io { source, .. } => source.to_string(),
-        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
-        ImageError::PixelCount { .. } => error.to_string(),
-    };
-    FileFault { code: "unreadable_texture", message }
 }

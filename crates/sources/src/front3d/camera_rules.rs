@@ -15,7 +15,6 @@ pub enum CameraRules {
 }
 
 impl CameraRules {
-    /// Every set.
     pub const ALL: [Self; 2] = [Self::BlenderProc, Self::ThreeDlg];
 
     /// The set's name: on the command line, in recipes and in `survey.json`.
@@ -100,7 +99,6 @@ impl std::fmt::Display for CameraRules {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{name}' is no set of camera rules; expected one of: {}", CameraRules::ALL.map(CameraRules::name).join(", "))]
 pub struct UnknownCameraRules {
-    /// The name.
     pub name: String,
 }
 
@@ -116,13 +114,10 @@ impl FromStr for CameraRules {
 /// How the variety of what a camera sees enters its score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coverage {
-    /// By the number of kinds and their shares.
     Kinds,
-    /// By the entropy of the hits by instance.
     EntropyOfInstances,
 }
 
-/// The rules for a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplerRules {
     /// Range of the height above the floor, in metres.

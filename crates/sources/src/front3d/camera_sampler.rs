@@ -8,17 +8,17 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::reference::ReferenceScene;
+use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
 use super::camera_rules::{Coverage, SamplerRules};
-use super::furnished_house::FurnishedHouse;
-use crate::clearance::distance_to_anything;
+use super::furnish::FurnishedHouse;
 
 /// A camera that keeps to the rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundCamera {
-    /// The input camera.
     pub camera: Camera,
     /// The [`score`] of the input view.
     pub score: f64,
@@ -95,26 +95,14 @@ impl Refusals {
 /// Why no camera can be drawn in a room.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// The room has no floor.
     #[error("room '{room}' has no floor for a camera to stand on; give a camera by hand")]
-    NoFloor {
-        /// The room's id.
-        room: String,
-    },
-    /// Every draw breaks a rule.
+    NoFloor { room: String },
     #[error(
         "none of {} cameras drawn in room '{room}' keeps the rules: {}; give a camera by hand, or try other rules or \
          another seed",
         rules.tries, refusals.counted(rules)
     )]
-    NoneFound {
-        /// The room's id.
-        room: String,
-        /// The rules.
-        rules: Box<SamplerRules>,
-        /// How many draws broke each rule.
-        refusals: Refusals,
-    },
+    NoneFound { room: String, rules: Box<SamplerRules>, refusals: Refusals },
 }
 
 /// A room made ready for drawing many cameras.
@@ -337,4 +325,29 @@ fn entropy_bits(counts: impl Iterator<Item = usize> + Clone) -> f64 {
         -share * libm::log2(share)
     };
     counts.filter(|count| *count > 0).map(bits).sum()
+}
+
+/// The distance in metres to the nearest triangle of the scene, or `enough` where that is smaller.
+pub fn distance_to_anything(scene: &ReferenceScene, from: DVec3, enough: f64) -> f64 {
+    let from = from.as_vec3();
+    let mut nearest = enough as f32;
+    for surface in &scene.surfaces {
+        nearest = nearest.min(distance_to_mesh(&surface.mesh, from, nearest));
+    }
+    f64::from(nearest)
+}
+
+/// The distance to the nearest point of a mesh, or `enough` where that is smaller.
+fn distance_to_mesh(mesh: &TriangleMesh, from: Vec3, enough: f32) -> f32 {
+    let mut nearest = enough;
+    for index in 0..mesh.triangles.len() {
+        let corners = mesh.corners(index);
+        // The bounding box excludes most triangles.
+        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+        if (from.clamp(low, high) - from).length() < nearest {
+            let corners = corners.map(|corner| corner.as_dvec3());
+            nearest = nearest.min(triangle::distance(corners, from.as_dvec3()) as f32);
+        }
+    }
+    nearest
 }

@@ -4,9 +4,79 @@
 use mateval_image::file_kind::{hint, without_mark};
 use serde_json::Value;
 
-use super::error::HouseError;
-use super::limits::Limits;
-use crate::json_size::JsonSize;
+use crate::source_scene::JsonSize;
+
+/// Limits on an untrusted house, checked before memory is taken. A house that exceeds them is refused; a model or texture that does is a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of a house's JSON. The largest known house has a twentieth of it.
+    pub json_bytes: u64,
+    /// Values in the JSON: numbers, texts, lists, objects.
+    pub json_values: usize,
+    /// Lists and objects in the JSON, each of which takes more memory than a number.
+    pub json_containers: usize,
+    /// Bytes of any other file.
+    pub file_bytes: u64,
+    /// Triangles of all models and meshes.
+    pub triangles: usize,
+    /// Texels of all textures.
+    pub texels: usize,
+    pub rooms: usize,
+    /// Children of all rooms.
+    pub children: usize,
+    /// Number of findings. Further ones are only counted.
+    pub findings: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            json_bytes: 128 << 20,
+            json_values: 16 << 20,
+            json_containers: 1 << 20,
+            file_bytes: 256 << 20,
+            triangles: 20_000_000,
+            texels: 512 << 20,
+            rooms: 1_000,
+            children: 50_000,
+            findings: 5_000,
+        }
+    }
+}
+
+/// Why JSON is not that of a 3D-FRONT house, or exceeds a limit.
+#[derive(Debug, thiserror::Error)]
+pub enum HouseError {
+    #[error("expected JSON: {reason}{hint}")]
+    NotJson {
+        reason: serde_json::Error,
+        /// What the file is instead, and what to do; empty where that is not known.
+        hint: String,
+    },
+    #[error("expected an object, found {found}")]
+    NotAnObject { found: &'static str },
+    /// The JSON holds more values than any file of the data.
+    #[error(
+        "expected at most {most_values} values and {most_containers} lists and objects, found {values} and {containers}"
+    )]
+    TooLarge { values: usize, containers: usize, most_values: usize, most_containers: usize },
+    #[error("expected an object 'scene' with rooms, found none")]
+    NoScene,
+    #[error("/scene/room: expected at most {most} rooms, found {found}")]
+    TooManyRooms { most: usize, found: usize },
+    #[error("{place}: expected at most {most} children in all rooms together, found more")]
+    TooManyChildren {
+        /// JSON pointer to the room at which the limit is exceeded.
+        place: String,
+        most: usize,
+    },
+    #[error("{place}: expected at most {most} triangles in all meshes together, found more")]
+    TooManyTriangles {
+        /// JSON pointer to the mesh at which the limit is exceeded.
+        place: String,
+        most: usize,
+    },
+}
 
 /// Parses an object. Fails where the text is not JSON, not an object, or exceeds `limits`.
 pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
@@ -17,18 +87,12 @@ pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
 /// Parses any JSON. Fails where the text is not JSON or exceeds `limits`.
 pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
     let text = without_mark(text);
-    check_size(text, limits)?;
-    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason, hint: hint(text).into_owned() })
-}
-
-/// Counts the values in the text before it is parsed.
-fn check_size(text: &[u8], limits: &Limits) -> Result<(), HouseError> {
     let JsonSize { values, containers } = JsonSize::of(text);
     if values > limits.json_values || containers > limits.json_containers {
         let (most_values, most_containers) = (limits.json_values, limits.json_containers);
         return Err(HouseError::TooLarge { values, containers, most_values, most_containers });
     }
-    Ok(())
+    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason, hint: hint(text).into_owned() })
 }
 
 /// The type of a value, for messages.

@@ -6,8 +6,7 @@ use mateval_scene::findings::shortened;
 use serde_json::Value;
 
 use super::document::{kind, list, number};
-use crate::log::Log;
-use crate::shift::shift_of;
+use crate::source_scene::{Log, shift_of};
 use crate::surface_mesh::has_area;
 
 /// Coordinates beyond this many metres are faults.

@@ -6,49 +6,28 @@
 //! pointer. An error means that the file is not a house.
 //!
 //! The steps:
-//! - `document` parses the JSON within limits; `house_reader` and `house_mesh` turn it into a [`House`];
-//! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `drop_shadow` finds
-//!   painted shadows, `classify` the classes of material by `class_table`, `finish` lays them out over a surface;
-//!   `coincident` moves apart the `sheets` that coincide; `cameras` adds the designers' cameras;
+//! - `document` parses the JSON within limits; `house` and `house_mesh` turn it into a [`House`] with its designers'
+//!   cameras;
+//! - [`furnish()`] places everything: `model` reads the furniture without painted shadows, `material_class` finds the
+//!   classes of material, `appearance` makes materials and textures;
 //! - the caller builds one [`World`](mateval_tracer::World) from the house's scene;
 //! - [`camera_sampler`] draws cameras in it that keep [`camera_rules`];
-//! - [`room_scene`] selects one room and what its views see of the other rooms, and `lights` adds the lights.
+//! - [`room_scene`] selects one room, what its views see of the other rooms, and its lights.
 
 mod appearance;
-mod appearance_rule;
 pub mod camera_rules;
 pub mod camera_sampler;
-mod cameras;
-mod class_table;
-mod classify;
 mod document;
-mod drop_shadow;
-mod error;
-mod finish;
 mod furnish;
-mod furnished_house;
-mod furnisher;
 mod house;
-mod house_files;
 mod house_mesh;
-mod house_reader;
-mod lights;
-mod limits;
+mod material_class;
 mod model;
-mod model_info;
 pub mod room_scene;
-
-pub use appearance_rule::AppearanceRule;
-pub use error::HouseError;
-pub use furnish::{furnish, read_house};
-pub use furnished_house::{FurnishedHouse, PlacedModel, PlacedSurface};
-pub use house::{
-    Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
-};
-pub use house_files::HouseFiles;
-pub use limits::Limits;
-
 #[cfg(test)]
 pub(crate) mod tests;
-#[cfg(test)]
-mod tests_real;
+
+pub use document::{HouseError, Limits};
+pub use furnish::{FurnishedHouse, HouseFiles, PlacedModel, PlacedSurface, furnish, read_house};
+pub use house::{Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Room};
+pub use material_class::AppearanceRule;

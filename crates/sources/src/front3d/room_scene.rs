@@ -1,19 +1,22 @@
-//! Makes a scene of one room of a house: its architecture and furniture, and what the views see of other rooms.
+//! Makes a scene of one room of a house: its architecture and furniture, what the views see of other rooms, and its lights,
+//! as BlenderProc sets them: ceilings and lamps emit although the camera sees their ordinary surface, and a grey environment
+//! surrounds the house.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_scene::ids::id_text_from;
-use mateval_scene::material::TextureIndex;
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-use mateval_scene::{Camera, SceneLights, SourceKind};
+use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
+use mateval_scene::reference::{
+    Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex,
+};
+use mateval_scene::{Camera, Role, SceneLights, SourceKind};
 use mateval_tracer::World;
 use mateval_tracer::aov::{coarse_subpixels, hit_through};
 use rayon::prelude::*;
 
-use super::appearance_rule::AppearanceRule;
-use super::furnished_house::FurnishedHouse;
+use super::furnish::FurnishedHouse;
 use super::house::ChildKind;
-use super::lights;
+use super::material_class::AppearanceRule;
 use crate::source_scene::{Missing, SourceScene};
 
 /// The most characters of a name before an appended number.
@@ -30,7 +33,7 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     for (surface, name) in scene.surfaces.iter_mut().zip(&names) {
         surface.name.clone_from(name);
     }
-    scene.lights = lights::groups(house, &kept, &scene);
+    scene.lights = light_groups(house, &kept, &scene);
     let states = house.appearance != AppearanceRule::Constant;
     SourceScene {
         kind: SourceKind::Front3d,
@@ -107,7 +110,7 @@ fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usiz
 /// Names of the kept surfaces: the house's own, with the room's id in front for other rooms. A number makes repeated names
 /// unique, also once they are turned into ids. No name is that of the environment's light.
 fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
-    let mut taken = BTreeSet::from([id_text_from(lights::WORLD_NAME, "")]);
+    let mut taken = BTreeSet::from([id_text_from(WORLD_NAME, "")]);
     let mut count: BTreeMap<String, usize> = BTreeMap::new();
     let name = |surface: &usize| {
         let placed = &house.placed[*surface];
@@ -151,4 +154,73 @@ fn scene_of(scene: &ReferenceScene, kept: &[usize]) -> ReferenceScene {
         part.surfaces.push(Surface { material, ..source.clone() });
     }
     part
+}
+
+/// Radiance of ceilings, times their colour.
+const CEILING: f32 = 0.8;
+/// Radiance of lamps, times their base colour.
+const LAMP: f32 = 7.0;
+/// The name of the environment's light group.
+const WORLD_NAME: &str = "world";
+const WORLD: f32 = 0.05;
+
+/// Whether and how a surface emits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Glow {
+    No,
+    /// With this radiance. Ceilings of one room with equal radiance form one light group.
+    Ceiling([f32; 3]),
+    Lamp,
+}
+
+fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
+    let placed = &house.placed[surface];
+    match &placed.origin.role {
+        role if role.is_ceiling() => Glow::Ceiling(placed.color.map(|v| v * CEILING)),
+        Role::LightFixture {} => Glow::Lamp,
+        Role::Architecture { .. } | Role::Furniture {} | Role::Other {} => Glow::No,
+    }
+}
+
+/// The light groups of the house's surfaces `kept`, which are the surfaces of `scene` in this order. As in Blender, both
+/// sides emit.
+fn light_groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) -> Vec<LightGroup> {
+    let mut groups: Vec<LightGroup> = Vec::new();
+    let mut ceilings: Vec<((usize, [f32; 3]), usize)> = Vec::new();
+    for (at, surface) in kept.iter().enumerate() {
+        let (radiance, map) = match glow(house, *surface) {
+            Glow::No | Glow::Ceiling(BLACK) => continue,
+            Glow::Lamp => lamp(scene, at),
+            // A ceiling joins the group of its room and radiance, if that exists.
+            Glow::Ceiling(radiance) => {
+                let key = (house.placed[*surface].room, radiance);
+                let known = ceilings.iter().find(|(known, _)| *known == key).map(|(_, group)| *group);
+                if let Some(Emission::Area { surfaces, .. }) = known.map(|group| &mut groups[group].emission) {
+                    surfaces.push(SurfaceIndex(at));
+                    continue;
+                }
+                ceilings.push((key, groups.len()));
+                (radiance, None)
+            }
+        };
+        let emission = Emission::Area { surfaces: vec![SurfaceIndex(at)], radiance, map, two_sided: true };
+        groups.push(LightGroup { name: scene.surfaces[at].name.clone(), emission, camera_visible: false });
+    }
+    let emission = Emission::Constant { radiance: [WORLD; 3] };
+    groups.push(LightGroup { name: WORLD_NAME.to_owned(), emission, camera_visible: true });
+    groups
+}
+
+const BLACK: [f32; 3] = [0.0; 3];
+
+/// The emission of a lamp, whose base colour is the emission's map or factor.
+fn lamp(scene: &ReferenceScene, surface: usize) -> ([f32; 3], Option<EmissionMap>) {
+    let material = &scene.materials[scene.surfaces[surface].material.0];
+    match material.model {
+        MaterialModel::Principled { base_color: ColorInput::Texture { texture, uv }, .. } => {
+            ([LAMP; 3], Some(EmissionMap { texture, uv }))
+        }
+        MaterialModel::Principled { base_color: ColorInput::Constant(color), .. } => (color.map(|v| LAMP * v), None),
+        _ => ([LAMP; 3], None),
+    }
 }

@@ -1,14 +1,11 @@
 //! Tests the reader on the built-in house with faults, on generated houses, on hostile files, and on real data if it
 //! exists.
 
-mod appearances;
-mod cameras;
-mod faults;
 mod hostile;
+mod houses;
 mod models;
 mod pieces;
-mod placement;
-mod releases;
+mod real;
 mod rooms;
 
 use std::path::{Path, PathBuf};
@@ -99,8 +96,8 @@ fn jid(number: u32) -> String {
 
 /// A house read from JSON alone, and the findings.
 fn read_house(json: &Value) -> (Result<House, HouseError>, Vec<mateval_scene::Finding>) {
-    let mut log = crate::log::Log::new("house.json".into(), 5_000);
-    let house = house_reader::read(json, "stem", &Limits::default(), &mut log);
+    let mut log = crate::source_scene::Log::new("house.json".into(), 5_000);
+    let house = house::read(json, "stem", &Limits::default(), &mut log);
     (house, log.into_findings())
 }
 
@@ -206,7 +203,7 @@ pub(crate) fn house_findings(pointer: &str, value: Value) -> Vec<String> {
         }] }
     });
     *house.pointer_mut(pointer).expect("the pointer exists") = value;
-    let mut log = crate::log::Log::new("house.json".to_owned(), 100);
-    house_reader::read(&house, "small", &Limits::default(), &mut log).unwrap();
+    let mut log = crate::source_scene::Log::new("house.json".to_owned(), 100);
+    house::read(&house, "small", &Limits::default(), &mut log).unwrap();
     log.into_findings().into_iter().map(|finding| finding.code).collect()
 }

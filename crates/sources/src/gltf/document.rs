@@ -1,16 +1,126 @@
-//! A glTF parsed within limits on memory, and refused where it requires an unknown extension, by its own statement or
-//! because its meshes exist in a compressed form alone.
+//! A glTF parsed within limits on memory, with its buffers and the files that it names. It is refused where it requires an
+//! unknown extension, by its own statement or because its meshes exist in a compressed form alone. Places are JSON pointers
+//! (RFC 6901).
 
 use gltf::json::validation;
 use mateval_image::file_kind::without_mark;
 use mateval_scene::findings::shortened;
+use mateval_scene::gltf_error::GltfError;
 use mateval_scene::gltf_file::{self, GltfFile, INSTANCING, json_of};
+use mateval_scene::source_folder::{FileFault, SourceFolder};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::error::GltfSceneError;
-use super::limits::Limits;
-use crate::json_size::JsonSize;
+use crate::source_scene::JsonSize;
+
+/// Limits on an untrusted glTF, checked before memory is taken. The file is refused where its JSON or its buffers exceed them; anything else is left out, which is a
+/// finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of the glTF, of any other file, and of all buffers together.
+    pub file_bytes: u64,
+    pub json_bytes: usize,
+    /// Values in the JSON: numbers, texts, lists, objects.
+    pub json_values: usize,
+    /// Lists and objects in the JSON, each of which takes more memory than a number.
+    pub json_containers: usize,
+    /// Primitives of all nodes; a mesh counts as often as nodes show it.
+    pub primitives: usize,
+    /// Triangles of all instances; a mesh counts as often as nodes show it, even if it turns out to be faulty.
+    pub triangles: usize,
+    /// Vertices of all instances, counted like triangles.
+    pub vertices: usize,
+    /// Texels of all textures.
+    pub texels: usize,
+    /// Number of lights. Each is rendered apart, so that the light of a view can be weighted anew.
+    pub lights: usize,
+    /// Number of findings. Further ones are only counted.
+    pub findings: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            file_bytes: 2 << 30,
+            json_bytes: 64 << 20,
+            json_values: 4 << 20,
+            json_containers: 1 << 20,
+            primitives: 200_000,
+            triangles: 20_000_000,
+            vertices: 30_000_000,
+            texels: 512 << 20,
+            lights: 128,
+            findings: 5_000,
+        }
+    }
+}
+
+/// Why a file is not a glTF scene that can be read.
+#[derive(Debug, thiserror::Error)]
+pub enum GltfSceneError {
+    #[error(
+        "expected JSON of at most {most_bytes} bytes, {most_values} values and {most_containers} lists and objects, found \
+         {bytes}, {values} and {containers}"
+    )]
+    TooLarge {
+        bytes: usize,
+        values: usize,
+        containers: usize,
+        most_bytes: usize,
+        most_values: usize,
+        most_containers: usize,
+    },
+    /// The file cannot be read without an extension that is not supported, such as a compression of meshes.
+    #[error("/extensionsRequired: '{name}' is not supported; {way_out}")]
+    RequiredExtension { name: String, way_out: &'static str },
+    /// A mesh or a buffer view exists in a compressed form alone, which is not supported.
+    #[error("{pointer}: its data are compressed ('{name}'), which is not supported; {way_out}")]
+    OnlyCompressed { pointer: String, name: &'static str, way_out: &'static str },
+    /// The file breaks the rules of glTF.
+    #[error("{pointer}: {reason}{}", and_more(*others))]
+    NotValid {
+        /// The first place that breaks them.
+        pointer: String,
+        reason: validation::Error,
+        others: usize,
+    },
+    #[error(transparent)]
+    NotGltf(GltfError),
+    #[error("/scenes: expected a scene, found none")]
+    NoScene,
+    #[error("/buffers/{buffer}/uri: {reason}")]
+    Buffer { buffer: usize, reason: FileFault },
+    #[error("/buffers/{buffer}: expected a `uri`, or a .glb with a binary part")]
+    BufferWithoutData { buffer: usize },
+    #[error("/buffers: expected at most {most} bytes together, found more")]
+    BuffersTooLarge { most: u64 },
+}
+
+impl From<GltfError> for GltfSceneError {
+    fn from(error: GltfError) -> Self {
+        let GltfError::Unsound(gltf::Error::Validation(faults)) = &error else { return Self::NotGltf(error) };
+        match faults.first() {
+            Some((path, reason)) => {
+                let pointer = shortened(&pointer(path.as_str()));
+                Self::NotValid { pointer, reason: *reason, others: faults.len() - 1 }
+            }
+            None => Self::NotGltf(error),
+        }
+    }
+}
+
+/// A path of the gltf crate, as in `meshes[0].name`, as a JSON pointer: `/meshes/0/name`.
+fn pointer(path: &str) -> String {
+    format!("/{}", path.replace(['.', '['], "/").replace([']', '"'], ""))
+}
+
+fn and_more(others: usize) -> String {
+    match others {
+        0 => String::new(),
+        1 => ", and 1 more fault".to_owned(),
+        _ => format!(", and {others} more faults"),
+    }
+}
 
 /// The extensions that may be required. Others change the meaning of the rest of the file.
 const KNOWN: [&str; 10] = [
@@ -117,4 +227,47 @@ fn check_instances(document: &gltf::Document) -> Result<(), GltfSceneError> {
         }
     }
     Ok(())
+}
+
+/// Reads all buffers. The binary part of a .glb is moved out of `file`.
+pub(super) fn read_buffers(
+    file: &mut GltfFile,
+    folder: &mut SourceFolder,
+    limits: &Limits,
+) -> Result<Vec<Vec<u8>>, GltfSceneError> {
+    let mut blob = file.blob.take();
+    let mut buffers = Vec::new();
+    let mut total = 0_u64;
+    for buffer in file.document.buffers() {
+        let number = buffer.index();
+        let bytes = match buffer.source() {
+            gltf::buffer::Source::Bin => blob.take().ok_or(GltfSceneError::BufferWithoutData { buffer: number })?,
+            gltf::buffer::Source::Uri(uri) => {
+                read_uri(uri, folder).map_err(|reason| GltfSceneError::Buffer { buffer: number, reason })?.0
+            }
+        };
+        total = total.saturating_add(bytes.len() as u64);
+        if total > limits.file_bytes {
+            return Err(GltfSceneError::BuffersTooLarge { most: limits.file_bytes });
+        }
+        buffers.push(bytes);
+    }
+    Ok(buffers)
+}
+
+/// The bytes that a URI names, and the file's name relative to the folder; none for base64 in the URI itself.
+pub(super) fn read_uri(uri: &str, folder: &mut SourceFolder) -> Result<(Vec<u8>, Option<String>), FileFault> {
+    let fault = |message: String| FileFault { code: "bad_uri", message };
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (_, encoded) = data
+            .split_once(";base64,")
+            .ok_or_else(|| fault(format!("expected `data:...;base64,...`, found '{}'", shortened(uri))))?;
+        let bytes = base64::decode(encoded).map_err(|error| fault(format!("not base64: {error}")))?;
+        return Ok((bytes, None));
+    }
+    let name = percent_encoding::percent_decode_str(uri)
+        .decode_utf8()
+        .map_err(|_| fault(format!("expected UTF-8, found '{}'", shortened(uri))))?;
+    let relative = SourceFolder::relative(&name)?;
+    Ok((folder.read(&relative)?, Some(relative)))
 }

@@ -5,47 +5,31 @@
 //! of the file, and what a scene cannot represent, are left out or replaced and reported as findings, whose places are
 //! JSON pointers. An error means that there is no scene to read.
 //!
-//! `document` parses the JSON within limits, and `buffers` reads the binary data, both with `uri` for files. `nodes`
-//! walks the tree of the default scene: `meshes` reads triangles, `materials` and `textures` (with `lookup`) the
-//! surfaces, `camera` the camera and `punctual` the lights. `reader` is the state that they share, `omitted` counts
-//! what is not represented.
+//! `document` parses the JSON within limits and reads the binary data. `nodes` walks the tree of the default scene and
+//! reads its triangles and camera, `materials` and `textures` the surfaces, `punctual` the lights. `reader` is the state
+//! that they share, and counts what is not represented.
 
-mod buffers;
-mod camera;
 mod document;
-mod error;
-mod limits;
-mod lookup;
 mod materials;
-mod meshes;
 mod nodes;
-mod omitted;
 mod punctual;
-mod read_material;
 mod reader;
-mod specular_glossiness;
 #[cfg(test)]
 pub(crate) mod tests;
-mod texture_key;
 mod textures;
-mod uri;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DVec3;
 use mateval_scene::reference::{Emission, LightGroup, ReferenceScene};
 use mateval_scene::{Camera, Finding, SceneLights};
 
-use crate::error::{InvalidSource, SourceError};
-use crate::licence::read_licence;
-use crate::log::Log;
-use crate::shift::{self, shift_of};
-use crate::source_scene::{InstanceOrigin, LicenceText};
+use crate::error::{InvalidSource, SourceError, open};
+use crate::source_scene::{InstanceOrigin, LicenceText, Log, UniqueNames, read_licence, report_shift, shift_of};
 use crate::{coincident, missing_uv};
-pub use error::GltfSceneError;
-pub use limits::Limits;
-use omitted::{LEFT_OUT, Omission};
-use reader::Reader;
+pub use document::{GltfSceneError, Limits};
+use reader::{LEFT_OUT, Omission, Reader, report_omitted};
 
 /// The radiance from everywhere that lights a scene whose file has no light.
 const DEFAULT_RADIANCE: [f32; 3] = [1.0; 3];
@@ -81,10 +65,10 @@ pub struct GltfScene {
 pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfScene, SourceError> {
     // The file and its buffers.
     let invalid = |error| SourceError::invalid(path, InvalidSource::Gltf(error));
-    let (mut source, name, bytes) = crate::source_scene::open(path, limits.file_bytes, limits.file_bytes)?;
+    let (mut source, name, bytes) = open(path, limits.file_bytes, limits.file_bytes)?;
     let mut file = document::parse(&bytes, limits).map_err(invalid)?;
     drop(bytes);
-    let buffers = buffers::read(&mut file, &mut source, limits).map_err(invalid)?;
+    let buffers = document::read_buffers(&mut file, &mut source, limits).map_err(invalid)?;
     let mut log = Log::new(name, limits.findings);
     let licence = read_licence(&mut source, &mut log);
     // The scene.
@@ -92,8 +76,26 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfS
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let scene = scene.ok_or_else(|| invalid(GltfSceneError::NoScene))?;
     let shift_m = shift_of(camera.or_else(|| nodes::place_of_camera(&scene)).unwrap_or(DVec3::ZERO));
-    shift::report(shift_m, &mut log);
-    let mut reader = Reader::new(&file, &buffers, limits, log, source);
+    report_shift(shift_m, &mut log);
+    let mut reader = Reader {
+        file: &file,
+        buffers: &buffers,
+        limits: *limits,
+        log,
+        omitted: BTreeMap::new(),
+        source,
+        scene: ReferenceScene::default(),
+        origins: Vec::new(),
+        textures: BTreeMap::new(),
+        faulty_images: BTreeSet::new(),
+        without_picture: file.without_picture.iter().map(String::as_str).collect(),
+        texels: 0,
+        materials: BTreeMap::new(),
+        primitives: 0,
+        triangles: 0,
+        vertices: 0,
+        light_names: UniqueNames::default(),
+    };
     reader.report_unused();
     let camera = reader.nodes(&scene, shift_m);
     let lights = default_light(&mut reader);
@@ -101,7 +103,7 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfS
     let Reader { mut scene, mut origins, mut log, omitted, source, .. } = reader;
     missing_uv::resolve(&mut scene, &mut origins, &mut log);
     coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
-    omitted.report(&mut log);
+    report_omitted(omitted, &mut log);
     let files = source.into_files();
     Ok(GltfScene {
         scene,

@@ -1,32 +1,39 @@
-//! The nodes of a scene: each mesh of a node becomes an instance for each of its materials, with its primitives as
-//! parts.
+//! The nodes of a scene: each mesh of a node becomes an instance for each of its materials, with its primitives as parts,
+//! and the first camera that can be used becomes the scene's.
 
 use std::collections::BTreeSet;
 
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3, Vec2, Vec3};
+use gltf::Semantic;
+use gltf::mesh::Mode;
 use gltf::scene::Transform;
 use mateval_scene::TriangleMesh;
-use mateval_scene::camera::Camera;
+use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::findings::shortened;
-use mateval_scene::gltf_accessor::numbers;
+use mateval_scene::gltf_accessor::{indices, numbers};
 use mateval_scene::gltf_error::GltfError;
 use mateval_scene::gltf_file::INSTANCING;
 use mateval_scene::reference::{Emission, Surface, SurfaceIndex};
 use serde_json::Value;
 
-use super::camera::perspective;
-use super::error::PrimitiveFault;
-use super::meshes::flat_shaded;
-use super::omitted::{LEFT_OUT, Omission};
-use super::read_material::ReadMaterial;
-use super::reader::Reader;
-use crate::parts::parts_of_labels;
-use crate::shift;
-use crate::source_scene::InstanceOrigin;
-use crate::surface_mesh::to_world;
+use super::reader::{LEFT_OUT, Omission, ReadMaterial, Reader};
+use crate::source_scene::{InstanceOrigin, shift_transform};
+use crate::surface_mesh::{parts_of_labels, to_world};
 
 /// Longer names are shortened, since a name may be copied to many instances.
 const LONGEST_NAME: usize = 1024;
+
+/// Columns of a picture whose size the recipe does not state; glTF states its shape alone.
+const WIDTH: u32 = 480;
+/// Width over height where the file does not state it.
+const ASPECT: f64 = 16.0 / 9.0;
+/// Least and most rows of such a picture.
+const HEIGHTS: std::ops::RangeInclusive<f64> = 16.0..=8192.0;
+
+/// Vertical fields of view in radians that a camera may have.
+const FIELDS: std::ops::RangeInclusive<f64> = 1e-3..=3.1;
+/// Farthest that a camera may stand from the origin along an axis, in metres: there, 64 bits are exact to 0.1 micrometres.
+const FARTHEST_M: f64 = 1e9;
 
 /// The primitives of a node that share a material, as one mesh.
 struct Group {
@@ -39,12 +46,40 @@ struct Group {
     labels: Vec<usize>,
 }
 
+impl Group {
+    /// Adds a primitive. Where only one of both meshes has normals, the other gets flat ones.
+    fn add(&mut self, mesh: &TriangleMesh, label: usize) {
+        self.labels.extend(std::iter::repeat_n(label, mesh.triangles.len()));
+        match (self.mesh.normals.is_some(), mesh.normals.is_some()) {
+            _ if self.mesh.positions.is_empty() => self.mesh = mesh.clone(),
+            (true, false) => self.mesh.append(&flat_shaded(mesh)),
+            (false, true) => {
+                self.mesh = flat_shaded(&self.mesh);
+                self.mesh.append(mesh);
+            }
+            _ => self.mesh.append(mesh),
+        }
+    }
+}
+
+/// Why a primitive of a mesh is left out.
+#[derive(Debug, thiserror::Error)]
+enum PrimitiveFault {
+    /// An accessor cannot be read, or its content is not what is wanted.
+    #[error(transparent)]
+    Accessor(#[from] GltfError),
+    #[error("the scene has more than {triangles} triangles or {vertices} vertices")]
+    TooLarge { triangles: usize, vertices: usize },
+    #[error("points or lines")]
+    NotASurface,
+}
+
 impl Reader<'_> {
     /// Adds all nodes of a scene, moved by `-shift`. Returns its first perspective camera, in the order of the tree.
     pub(super) fn nodes(&mut self, scene: &gltf::Scene<'_>, shift: DVec3) -> Option<Camera> {
         let mut camera = None;
         let mut visited = BTreeSet::new();
-        let root = shift::transform(shift);
+        let root = shift_transform(shift);
         let mut open: Vec<(gltf::Node<'_>, DMat4)> = scene.nodes().map(|node| (node, root)).collect();
         open.reverse();
         while let Some((node, world_from_parent)) = open.pop() {
@@ -183,10 +218,12 @@ impl Reader<'_> {
     }
 
     fn report_primitive(&mut self, fault: &PrimitiveFault, pointer: &str) {
-        if let PrimitiveFault::NotASurface = fault {
-            return self.omit(Omission::Slight, "points and lines", LEFT_OUT, pointer);
-        }
-        self.log.warn(fault.code(), pointer, fault.to_string(), "left the primitive out");
+        let code = match fault {
+            PrimitiveFault::Accessor(_) => "bad_mesh",
+            PrimitiveFault::TooLarge { .. } => "limit",
+            PrimitiveFault::NotASurface => return self.omit(Omission::Slight, "points and lines", LEFT_OUT, pointer),
+        };
+        self.log.warn(code, pointer, fault.to_string(), "left the primitive out");
     }
 
     /// Adds an instance, and its light if its material emits.
@@ -211,20 +248,80 @@ impl Reader<'_> {
         self.scene.surfaces.push(Surface { name, mesh, material: group.read.index });
         self.origins.push(InstanceOrigin { part_of_triangle, stated: group.read.stated, ..InstanceOrigin::default() });
     }
-}
 
-impl Group {
-    /// Adds a primitive. Where only one of both meshes has normals, the other gets flat ones.
-    fn add(&mut self, mesh: &TriangleMesh, label: usize) {
-        self.labels.extend(std::iter::repeat_n(label, mesh.triangles.len()));
-        match (self.mesh.normals.is_some(), mesh.normals.is_some()) {
-            _ if self.mesh.positions.is_empty() => self.mesh = mesh.clone(),
-            (true, false) => self.mesh.append(&flat_shaded(mesh)),
-            (false, true) => {
-                self.mesh = flat_shaded(&self.mesh);
-                self.mesh.append(mesh);
+    /// The triangles of a primitive, with the texture coordinates of one set. Counts them before they are read.
+    fn primitive(
+        &mut self,
+        primitive: &gltf::Primitive<'_>,
+        uv_set: Option<u32>,
+        pointer: &str,
+    ) -> Result<TriangleMesh, PrimitiveFault> {
+        if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            return Err(PrimitiveFault::NotASurface);
+        }
+        let positions = primitive.get(&Semantic::Positions).ok_or(GltfError::Missing { attribute: "POSITION" })?;
+        let corner_numbers = primitive.indices();
+        let corners = corner_numbers.as_ref().map_or(positions.count(), gltf::Accessor::count);
+        self.count(positions.count(), corners, primitive.mode())?;
+        self.report_omitted_attributes(primitive, pointer);
+        // Counts are compared before anything is read, so that what is read is bounded by what was counted.
+        let mut same = |semantic: Semantic, what: &str| {
+            let accessor = primitive.get(&semantic)?;
+            let (expected, found) = (positions.count(), accessor.count());
+            if expected == found {
+                return Some(accessor);
             }
-            _ => self.mesh.append(mesh),
+            let message = format!("{what} has {found} entries, POSITION {expected}");
+            self.log.warn("bad_attribute", pointer, message, "treated it as absent");
+            None
+        };
+        let normals = same(Semantic::Normals, "NORMAL");
+        let uvs = same(Semantic::TexCoords(uv_set.unwrap_or(0)), "TEXCOORD");
+        let positions = numbers::<3>(&positions, self.buffers)?.into_iter().map(Vec3::from_array).collect();
+        let normals = normals.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose()?;
+        let uvs = uvs.map(|accessor| numbers::<2>(&accessor, self.buffers)).transpose()?;
+        let mesh = TriangleMesh {
+            positions,
+            normals: normals.map(|all| all.into_iter().map(Vec3::from_array).collect()),
+            // v upwards.
+            uvs: uvs.map(|all| all.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect()),
+            triangles: Vec::new(),
+        };
+        let vertices = mesh.positions.len();
+        let numbers = match corner_numbers {
+            Some(accessor) => indices(&accessor, self.buffers)?,
+            None => (0..vertices as u32).collect(),
+        };
+        let listed = listed(numbers, primitive.mode());
+        let (all, rest) = listed.as_chunks::<3>();
+        let sound = |triangle: &&[u32; 3]| triangle.iter().all(|vertex| (*vertex as usize) < vertices);
+        let triangles: Vec<[u32; 3]> = all.iter().filter(sound).copied().collect();
+        let bad = all.len() - triangles.len() + usize::from(!rest.is_empty());
+        if bad > 0 {
+            let message = format!("{bad} of {} triangles name vertices that do not exist, or too few", all.len());
+            self.log.warn("bad_indices", pointer, message, "left them out");
+        }
+        Ok(TriangleMesh { triangles, ..mesh })
+    }
+
+    /// Adds to the counts of vertices and triangles. Fails, without adding, where they would exceed the limits.
+    fn count(&mut self, vertices: usize, corners: usize, mode: Mode) -> Result<(), PrimitiveFault> {
+        let triangles = if mode == Mode::Triangles { corners / 3 } else { corners };
+        let (all_vertices, all_triangles) =
+            (self.vertices.saturating_add(vertices), self.triangles.saturating_add(triangles));
+        if all_vertices > self.limits.vertices || all_triangles > self.limits.triangles {
+            return Err(PrimitiveFault::TooLarge { triangles: self.limits.triangles, vertices: self.limits.vertices });
+        }
+        (self.vertices, self.triangles) = (all_vertices, all_triangles);
+        Ok(())
+    }
+
+    fn report_omitted_attributes(&mut self, primitive: &gltf::Primitive<'_>, pointer: &str) {
+        if primitive.get(&Semantic::Colors(0)).is_some() {
+            self.omit(Omission::Visible, "colours of vertices (COLOR_0)", LEFT_OUT, pointer);
+        }
+        if primitive.morph_targets().next().is_some() {
+            self.omit(Omission::Visible, "morph targets", "showed the mesh without them", pointer);
         }
     }
 }
@@ -277,5 +374,67 @@ fn node_name(node: &gltf::Node<'_>) -> String {
         Some(name) if name.len() <= LONGEST_NAME => name.to_owned(),
         Some(name) => shortened(name),
         None => format!("node {}", node.index()),
+    }
+}
+
+/// The corners of strips and fans as those of single triangles, with the same front (glTF 2.0, section 3.7.2.1).
+fn listed(numbers: Vec<u32>, mode: Mode) -> Vec<u32> {
+    let strip = |at: usize, corners: &[u32]| {
+        if at.is_multiple_of(2) { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] }
+    };
+    match mode {
+        Mode::TriangleStrip => numbers.windows(3).enumerate().flat_map(|(at, corners)| strip(at, corners)).collect(),
+        Mode::TriangleFan => {
+            let rest = numbers.get(1..).unwrap_or_default();
+            rest.windows(2).flat_map(|edge| [edge[0], edge[1], numbers[0]]).collect()
+        }
+        _ => numbers,
+    }
+}
+
+/// The mesh with corners of its own for each triangle, and their flat normals.
+fn flat_shaded(mesh: &TriangleMesh) -> TriangleMesh {
+    let corners: Vec<usize> = mesh.triangles.as_flattened().iter().map(|vertex| *vertex as usize).collect();
+    let normal = |at: usize| mesh.geometric_normal(at / 3).as_vec3();
+    TriangleMesh {
+        positions: corners.iter().map(|vertex| mesh.positions[*vertex]).collect(),
+        normals: Some((0..corners.len()).map(normal).collect()),
+        uvs: mesh.uvs.as_ref().map(|uvs| corners.iter().map(|vertex| uvs[*vertex]).collect()),
+        triangles: (0..mesh.triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect(),
+    }
+}
+
+/// The node's camera; none for an orthographic one, one of an impossible field of view, one that a transform flattens,
+/// and one too far away.
+fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> Option<Camera> {
+    let gltf::camera::Projection::Perspective(lens) = camera.projection() else { return None };
+    let fov_y = f64::from(lens.yfov());
+    if !FIELDS.contains(&fov_y) {
+        return None;
+    }
+    let aspect = lens.aspect_ratio().map_or(ASPECT, f64::from);
+    let height = f64::from(WIDTH) / if aspect > 0.0 { aspect } else { ASPECT };
+    let height = height.clamp(*HEIGHTS.start(), *HEIGHTS.end()).round() as u32;
+    // A camera looks along its -Z with +Y up, as ours does. Scale and shear do not change what it sees.
+    let linear = DMat3::from_mat4(world_from_node);
+    let back = linear.z_axis.try_normalize()?;
+    let right = linear.y_axis.cross(back).try_normalize()?;
+    let rotation = DMat3::from_cols(right, back.cross(right), back);
+    let position = world_from_node.w_axis.truncate();
+    let is_near = position.abs().max_element() <= FARTHEST_M;
+    is_near.then(|| Camera::from_rotation(rotation, position, Intrinsics::from_fov_y(WIDTH, height, fov_y)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_and_fans_keep_their_front() {
+        assert_eq!(listed(vec![0, 1, 2, 3], Mode::TriangleStrip), [0, 1, 2, 2, 1, 3]);
+        assert_eq!(listed(vec![0, 1, 2, 3], Mode::TriangleFan), [1, 2, 0, 2, 3, 0]);
+        for mode in [Mode::TriangleStrip, Mode::TriangleFan] {
+            assert!(listed(Vec::new(), mode).is_empty() && listed(vec![0, 1], mode).is_empty());
+        }
     }
 }

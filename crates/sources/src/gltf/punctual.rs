@@ -13,10 +13,8 @@ use mateval_scene::material::{ColorInput, Material, MaterialModel, TextureIndex}
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, SourceTexture, Surface, SurfaceIndex};
 use mateval_scene::{Role, TriangleMesh};
 
-use super::omitted::{LEFT_OUT, Omission};
-use super::reader::Reader;
-use crate::bitterli::primitives::{disk, sphere};
-use crate::map_disc::{MapDisc, ROWS};
+use super::reader::{LEFT_OUT, Omission, Reader};
+use crate::primitives::{MapDisc, ROWS, disk, sphere};
 use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::to_world;
 

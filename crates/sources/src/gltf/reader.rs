@@ -1,28 +1,24 @@
-//! The state that all parts of the reader share: the file, the scene under construction and its findings.
+//! The state that all parts of the reader share: the file, the scene under construction, its findings, and the features that
+//! it cannot represent, counted by kind: one finding a kind, however often it occurs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_scene::findings::shortened;
 use mateval_scene::gltf_file::GltfFile;
-use mateval_scene::material::TextureIndex;
-use mateval_scene::reference::{Emission, LightGroup, ReferenceScene};
+use mateval_scene::material::{StatedParameters, TextureIndex};
+use mateval_scene::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene};
 use mateval_scene::source_folder::SourceFolder;
 
-use super::limits::Limits;
-use super::omitted::{LEFT_OUT, Omission, Omitted};
-use super::read_material::ReadMaterial;
-use super::texture_key::TextureKey;
-use crate::log::Log;
-use crate::source_scene::InstanceOrigin;
-use crate::unique_names::UniqueNames;
+use super::document::Limits;
+use crate::source_scene::{InstanceOrigin, Log, UniqueNames};
 
-/// A scene under construction.
 pub(super) struct Reader<'a> {
     pub(super) file: &'a GltfFile,
     pub(super) buffers: &'a [Vec<u8>],
     pub(super) limits: Limits,
     pub(super) log: Log,
-    pub(super) omitted: Omitted,
+    /// The features that were left out so far, by kind.
+    pub(super) omitted: BTreeMap<(Omission, String), Occurrences>,
     pub(super) source: SourceFolder,
     pub(super) scene: ReferenceScene,
     /// Facts about each surface.
@@ -47,38 +43,11 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// A reader of a file with these buffers.
-    pub(super) fn new(
-        file: &'a GltfFile,
-        buffers: &'a [Vec<u8>],
-        limits: &Limits,
-        log: Log,
-        source: SourceFolder,
-    ) -> Self {
-        Self {
-            file,
-            buffers,
-            limits: *limits,
-            log,
-            omitted: Omitted::default(),
-            source,
-            scene: ReferenceScene::default(),
-            origins: Vec::new(),
-            textures: BTreeMap::new(),
-            faulty_images: BTreeSet::new(),
-            without_picture: file.without_picture.iter().map(String::as_str).collect(),
-            texels: 0,
-            materials: BTreeMap::new(),
-            primitives: 0,
-            triangles: 0,
-            vertices: 0,
-            light_names: UniqueNames::default(),
-        }
-    }
-
-    /// Counts a feature that the scene cannot represent.
+    /// Counts a feature at a JSON pointer that the scene cannot represent. `feature` begins a sentence that ends in "not
+    /// represented", and `action` states what is done instead.
     pub(super) fn omit(&mut self, omission: Omission, feature: &str, action: &str, pointer: &str) {
-        self.omitted.add(omission, feature, action, pointer);
+        let first = || Occurrences { count: 0, first: pointer.to_owned(), action: action.to_owned() };
+        self.omitted.entry((omission, feature.to_owned())).or_insert_with(first).count += 1;
     }
 
     /// Counts the extensions of an object that the scene cannot represent.
@@ -99,5 +68,75 @@ impl<'a> Reader<'a> {
         let name = self.light_names.unique(name.to_owned());
         self.scene.lights.push(LightGroup { name, emission, camera_visible });
         true
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ReadMaterial {
+    pub(super) index: MaterialIndex,
+    /// The set of texture coordinates that its textures are looked up at; none where it has no texture.
+    pub(super) uv_set: Option<u32>,
+    /// What the file states of it.
+    pub(super) stated: StatedParameters,
+    pub(super) glow: Option<Glow>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Glow {
+    /// Linear Rec. 709 radiance.
+    pub(super) radiance: [f32; 3],
+    /// The texture that multiplies it.
+    pub(super) map: Option<EmissionMap>,
+    pub(super) two_sided: bool,
+}
+
+/// The aspect of an image that a texture holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Aspect {
+    /// The sRGB colour, times a linear factor for each channel, given by its bits.
+    Color([u32; 3]),
+    /// The linear values of all channels.
+    Values,
+    /// One channel's linear values, times a factor, given by its bits.
+    Channel(usize, u32),
+    /// The alpha channel, times a factor, given by its bits.
+    Alpha(u32),
+    /// 1 where the alpha channel, times a factor, reaches a threshold, else 0; both are given by their bits.
+    Mask(u32, u32),
+}
+
+/// The image's index in the file, a number for each wrap mode, and the aspect. Textures with equal keys are equal.
+pub(super) type TextureKey = (usize, u8, Aspect);
+
+/// What is done with most features that cannot be represented.
+pub(super) const LEFT_OUT: &str = "left it out";
+
+/// The occurrences of one kind of feature.
+#[derive(Debug)]
+pub(super) struct Occurrences {
+    count: usize,
+    /// The JSON pointer of the first.
+    first: String,
+    action: String,
+}
+
+/// Whether leaving a feature out changes how the scene looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Omission {
+    /// It does: a warning.
+    Visible,
+    /// It does not, or hardly: a note.
+    Slight,
+}
+
+/// Reports every kind of omitted feature with its count.
+pub(super) fn report_omitted(omitted: BTreeMap<(Omission, String), Occurrences>, log: &mut Log) {
+    for ((omission, feature), Occurrences { count, first, action }) in omitted {
+        let times = if count == 1 { String::new() } else { format!(" ({count} times; the first is named)") };
+        let message = format!("{feature}: not represented{times}");
+        match omission {
+            Omission::Visible => log.warn("not_represented", &first, message, action),
+            Omission::Slight => log.note("not_represented", &first, message, action),
+        }
     }
 }

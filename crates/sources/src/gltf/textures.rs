@@ -1,4 +1,5 @@
-//! Textures: images of the file, decoded once for each use, with the factors of materials multiplied in.
+//! Textures: images of the file, decoded once for each use, with the factors of materials multiplied in, and how they are
+//! looked up.
 
 use std::path::Path;
 
@@ -9,16 +10,60 @@ use mateval_scene::Severity;
 use mateval_scene::findings::shortened;
 use mateval_scene::gltf_accessor::view_bytes;
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex};
+use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;
 use mateval_scene::source_folder::FileFault;
 
-use super::lookup::{Lookup, wraps};
-use super::omitted::Omission;
-use super::reader::Reader;
-use super::texture_key::{Aspect, TextureKey};
-use super::uri;
-use crate::mean_color::mean_color;
+use super::document::read_uri;
+use super::reader::{Aspect, Omission, Reader};
+use crate::missing_uv::mean_color;
+use crate::source_scene::picture_fault;
+
+#[derive(Clone)]
+pub(super) struct Lookup<'a> {
+    pub(super) texture: gltf::Texture<'a>,
+    /// The set of texture coordinates.
+    pub(super) set: u32,
+    /// The mapping from the surface's uv, with v upwards, to the texture's.
+    pub(super) uv: UvTransform,
+}
+
+impl<'a> Lookup<'a> {
+    /// The lookup of a material's texture, with its `KHR_texture_transform`.
+    pub(super) fn new(info: &gltf::texture::Info<'a>) -> Self {
+        let transform = info.texture_transform();
+        let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
+        Self { texture: info.texture(), set, uv: transform.map_or(UvTransform::default(), |t| upward(&t)) }
+    }
+}
+
+/// The extension's matrix, translation * rotation * scale, for a v that grows upwards; glTF's grows downwards.
+///
+/// The rotation is counter-clockwise in the picture (KHR_texture_transform, section "Overview"). A transform that is
+/// not finite maps everything to one point.
+fn upward(transform: &gltf::texture::TextureTransform<'_>) -> UvTransform {
+    let [offset_u, offset_v] = transform.offset().map(f64::from);
+    let [scale_u, scale_v] = transform.scale().map(f64::from);
+    let (sin, cos) = libm::sincos(f64::from(transform.rotation()));
+    let downward = [[cos * scale_u, sin * scale_v, offset_u], [-sin * scale_u, cos * scale_v, offset_v]];
+    let [[a, b, c], [d, e, f]] = downward;
+    // v' = 1 - v on both sides.
+    let rows = [[a, -b, b + c], [-d, e, 1.0 - e - f]];
+    // Adding 0 turns the -0 of an absent rotation into 0.
+    let rows = rows.map(|row| row.map(|value| value as f32 + 0.0));
+    if rows.iter().flatten().all(|value| value.is_finite()) { UvTransform(rows) } else { UvTransform([[0.0; 3]; 2]) }
+}
+
+/// The modes in which a texture continues outside of 0..1; `(u, v)`.
+pub(super) fn wraps(texture: &gltf::Texture<'_>) -> [Wrap; 2] {
+    use gltf::texture::WrappingMode;
+    let sampler = texture.sampler();
+    [sampler.wrap_s(), sampler.wrap_t()].map(|mode| match mode {
+        WrappingMode::Repeat => Wrap::Repeat,
+        WrappingMode::ClampToEdge => Wrap::Clamp,
+        WrappingMode::MirroredRepeat => Wrap::Mirror,
+    })
+}
 
 /// Linear mid-grey, which replaces a colour that cannot be read.
 const MISSING: f32 = 0.5;
@@ -26,7 +71,6 @@ const MISSING: f32 = 0.5;
 /// The first bytes of the picture formats that glTF allows, and of WebP.
 const SIGNATURES: [&[u8]; 3] = [b"\x89PNG", b"\xff\xd8\xff", b"RIFF"];
 
-/// A decoded image.
 pub(super) struct Decoded {
     name: String,
     sha256: String,
@@ -91,7 +135,7 @@ impl Reader<'_> {
     fn texture(&mut self, texture: &gltf::Texture<'_>, aspect: Aspect) -> Option<TextureIndex> {
         let [wrap, wrap_v] = wraps(texture);
         let image = texture.source();
-        let key = TextureKey::new(image.index(), wrap, aspect);
+        let key = (image.index(), wrap as u8, aspect);
         if let Some(known) = self.textures.get(&key) {
             return *known;
         }
@@ -129,7 +173,7 @@ impl Reader<'_> {
                     opacity(alpha, wrap, |alpha| if alpha * factor >= cutoff { 1.0 } else { 0.0 })
                 }
             };
-            let texture = texture.map_err(|error| picture_fault(&error))?;
+            let texture = texture.map_err(|error| picture_fault("bad_image", &error))?;
             Ok(SourceTexture { name, sha256: Some(sha256), texture })
         });
         match loaded {
@@ -170,7 +214,7 @@ impl Reader<'_> {
             return Err(limit(self.limits.texels));
         }
         let (bytes, file) = match image.source() {
-            gltf::image::Source::Uri { uri, .. } => uri::read(uri, &mut self.source)?,
+            gltf::image::Source::Uri { uri, .. } => read_uri(uri, &mut self.source)?,
             gltf::image::Source::View { view, .. } => {
                 let bytes = view_bytes(&view, self.buffers);
                 let fault = |error| FileFault { code: "bad_image", message: format!("{error}") };
@@ -185,23 +229,13 @@ impl Reader<'_> {
         let own_name = || image.name().map(shortened).unwrap_or_else(|| format!("image {}", image.index()));
         let name = file.unwrap_or_else(own_name);
         let read = texture_and_alpha_of_bytes(Path::new(&name), bytes, encoding, wrap);
-        let (color, alpha) = read.map_err(|error| picture_fault(&error))?;
+        let (color, alpha) = read.map_err(|error| picture_fault("bad_image", &error))?;
         self.texels = self.texels.saturating_add(color.width() * color.height());
         if self.texels > self.limits.texels {
             return Err(limit(self.limits.texels));
         }
         Ok(Decoded { name, sha256, color, alpha })
     }
-}
-
-/// The fault of a picture, without its path, which the finding names.
-fn picture_fault(error: &ImageError) -> FileFault {
-    let message = match error {
-        ImageError::Io { source, .. } => source.to_string(),
-        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
-        ImageError::PixelCount { .. } => error.to_string(),
-    };
-    FileFault { code: "bad_image", message }
 }
 
 /// The texture times a linear factor; the texture itself where that is 1.
@@ -231,4 +265,44 @@ fn opacity(alpha: Option<Texture>, wrap: Wrap, value: impl Fn(f32) -> f32) -> Re
 /// All texels, row by row.
 fn all_texels(texture: &Texture) -> impl Iterator<Item = [f32; 3]> + '_ {
     (0..texture.height()).flat_map(move |y| (0..texture.width()).map(move |x| texture.texel(x, y)))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+
+    fn of(transform: &str) -> UvTransform {
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"a"}}],"textures":[{{"source":0}}],"materials":[
+            {{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{transform}}}}}}}}}]}}"#
+        );
+        let file = mateval_scene::gltf_file::parse(text.as_bytes()).unwrap().document;
+        let info = file.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
+        Lookup::new(&info).uv
+    }
+
+    #[test]
+    fn no_transform_is_the_identity() {
+        assert_eq!(of("{}"), UvTransform::default());
+    }
+
+    /// The extension's example shader, by hand, at (0.25, 0.5) of glTF's coordinates.
+    #[test]
+    fn as_the_extension_defines_it() {
+        let apply = |transform: &str| {
+            let upward = of(transform).apply(Vec2::new(0.25, 1.0 - 0.5));
+            Vec2::new(upward.x, 1.0 - upward.y)
+        };
+        assert_eq!(apply(r#"{"offset":[0.5,0.125],"scale":[2,3]}"#), Vec2::new(1.0, 1.625));
+        // A quarter turn: matrix (0 1; -1 0) in glTF's coordinates.
+        let turned = apply(r#"{"rotation":1.5707963267948966,"scale":[2,3]}"#);
+        assert!((turned - Vec2::new(1.5, -0.5)).length() < 1e-6, "{turned}");
+    }
+
+    #[test]
+    fn a_transform_that_overflows_is_one_point() {
+        assert_eq!(of(r#"{"offset":[0,3e38],"scale":[1,3e38]}"#).apply(Vec2::ONE), Vec2::ZERO);
+    }
 }

@@ -1,5 +1,5 @@
-//! Mitsuba's analytic shapes as triangles in object space. Normals point to the front. v grows upwards, so it is one minus
-//! Mitsuba's.
+//! Shapes that files state by a formula: Mitsuba's as triangles in object space, whose normals point to the front and whose
+//! v grows upwards (one minus Mitsuba's), and the disc of a sun in a latitude-longitude map.
 
 use std::f64::consts::PI;
 
@@ -7,9 +7,8 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use mateval_scene::TriangleMesh;
 
 /// Segments of a full circle.
-pub(super) const SEGMENTS: u32 = 64;
+pub(crate) const SEGMENTS: u32 = 64;
 
-/// A mesh under construction.
 #[derive(Default)]
 struct Builder {
     positions: Vec<Vec3>,
@@ -88,7 +87,7 @@ pub(crate) fn disk() -> TriangleMesh {
 }
 
 /// The side of a cylinder, open at both ends, facing outwards.
-pub(super) fn cylinder(start: DVec3, end: DVec3, radius: f64) -> TriangleMesh {
+pub(crate) fn cylinder(start: DVec3, end: DVec3, radius: f64) -> TriangleMesh {
     let mut build = Builder::default();
     let axis = (end - start).normalize_or_zero();
     let (x, y) = axis.any_orthonormal_pair();
@@ -139,6 +138,58 @@ pub(crate) fn sphere(center: DVec3, radius: f64) -> TriangleMesh {
 fn on_circle(turn: f64) -> DVec3 {
     let (sin, cos) = libm::sincos(2.0 * PI * turn);
     DVec3::new(cos, sin, 0.0)
+}
+
+/// Rows of a map; it has twice as many columns, so a texel is 0.35 degrees high.
+pub(crate) const ROWS: usize = 512;
+
+/// The texels that a disc covers.
+pub(crate) struct MapDisc {
+    /// Indices of texels, row by row, each with the fraction of it that the disc covers.
+    pub(crate) shares: Vec<(usize, f64)>,
+    /// The solid angle of the covered fractions, in steradians; above 0.
+    pub(crate) solid_angle: f64,
+}
+
+impl MapDisc {
+    /// The disc around a unit vector in the map's frame. One smaller than a texel is enlarged to a texel. None where no
+    /// texel's sample lies in it.
+    pub(crate) fn new(center: DVec3, diameter_deg: f64) -> Option<Self> {
+        // The fraction of a texel that the disc covers, by 16 x 16 samples.
+        const PARTS: usize = 16;
+        let radius = (diameter_deg / 2.0).to_radians().max(PI / ROWS as f64 / 2.0);
+        let least_cos = libm::cos(radius);
+        let columns = 2 * ROWS;
+        let covered = |index: usize| {
+            let inside = |part: usize| {
+                let (right, down) = ((part % PARTS) as f64 + 0.5, (part / PARTS) as f64 + 0.5);
+                let at = texel_direction(index % columns, index / columns, right / PARTS as f64, down / PARTS as f64);
+                at.dot(center) >= least_cos
+            };
+            (0..PARTS * PARTS).filter(|&part| inside(part)).count() as f64 / (PARTS * PARTS) as f64
+        };
+        // Only texels near the disc are sampled; a texel reaches at most 0.36 degrees from its centre.
+        let near = libm::cos((radius + 0.01).min(PI));
+        let close = |index: usize| texel_direction(index % columns, index / columns, 0.5, 0.5).dot(center) >= near;
+        let shares: Vec<(usize, f64)> = (0..columns * ROWS).filter(|&i| close(i)).map(|i| (i, covered(i))).collect();
+        let solid_angle: f64 = shares.iter().map(|(index, share)| share * texel_solid_angle(index / columns)).sum();
+        (solid_angle > 0.0).then_some(Self { shares, solid_angle })
+    }
+}
+
+/// The direction of a point in a texel. `right` and `down` run from 0 to 1 over the texel.
+pub(crate) fn texel_direction(column: usize, row: usize, right: f64, down: f64) -> DVec3 {
+    let phi = 2.0 * PI * (column as f64 + right) / (2 * ROWS) as f64;
+    let theta = PI * (row as f64 + down) / ROWS as f64;
+    let (sin_phi, cos_phi) = libm::sincos(phi);
+    let (sin_theta, cos_theta) = libm::sincos(theta);
+    DVec3::new(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta)
+}
+
+/// The solid angle of a texel of this row, in steradians.
+pub(crate) fn texel_solid_angle(row: usize) -> f64 {
+    let edge = |row: usize| libm::cos(PI * row as f64 / ROWS as f64);
+    PI / ROWS as f64 * (edge(row) - edge(row + 1))
 }
 
 #[cfg(test)]
