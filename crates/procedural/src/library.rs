@@ -2,7 +2,7 @@
 
 use crate::error::ProceduralError;
 use crate::graph::Graph;
-use crate::limits::Limits;
+use crate::mtlx::Limits;
 use crate::mtlx::read_text;
 
 /// What kind of pattern a graph makes.
@@ -39,14 +39,10 @@ impl serde::Serialize for Class {
     }
 }
 
-/// A built-in graph.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// The name.
     pub name: &'static str,
-    /// The kind of pattern.
     pub class: Class,
-    /// The `.mtlx` file.
     pub text: &'static str,
 }
 
@@ -60,7 +56,6 @@ macro_rules! entries {
     };
 }
 
-/// All built-in graphs.
 pub const LIBRARY: [Entry; 28] = entries![
     Flat "paint",
     Isotropic "plaster",
@@ -92,7 +87,6 @@ pub const LIBRARY: [Entry; 28] = entries![
     Oriented "metal",
 ];
 
-/// The entry of this name.
 pub fn entry(name: &str) -> Option<&'static Entry> {
     LIBRARY.iter().find(|entry| entry.name == name)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
 use mateval_procedural::library::entry;
-use mateval_procedural::limits::Limits;
+use mateval_procedural::mtlx::Limits;
 use mateval_procedural::mtlx::read_file;
 use mateval_scene::SceneError;
 

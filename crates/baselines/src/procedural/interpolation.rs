@@ -35,7 +35,7 @@ pub(super) fn interpolation_error(points: &[Point]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use mateval_procedural::noise::cell::cell;
+    use mateval_procedural::noise::cell;
 
     use super::*;
 

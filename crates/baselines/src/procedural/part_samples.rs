@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use mateval_procedural::fit::points::Point;
-use mateval_procedural::noise::cell::cell;
+use mateval_procedural::noise::cell;
 use mateval_scene::{Camera, PartSetId};
 
 use super::part_frame::{Chart, PartFrame, Triangle};

@@ -19,27 +19,14 @@
 //!
 //! [`paper`] fits as PSDR-Room does, to be compared with.
 
-mod boards;
 pub mod candidate;
-mod category;
 mod cells;
 pub mod choose;
-mod colors;
-mod hypotheses;
-mod lm;
-mod model;
-mod octaves;
-mod pairs;
+mod least_squares;
+pub mod model;
 pub mod paper;
-mod pattern;
-mod periods;
 pub mod points;
-mod ranked;
-pub mod roles;
-mod settle;
-mod sizes;
-mod smooth;
+mod starts;
 mod statistics;
-mod system;
 mod texture;
 pub mod waves;

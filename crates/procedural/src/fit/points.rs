@@ -1,6 +1,6 @@
 //! What is seen of a part: colours at places of its surface.
 
-use crate::noise::cell::cell;
+use crate::noise::cell;
 
 /// A place of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use mateval_procedural::Graph;
 use mateval_procedural::graph::{Node, Parameter, Source};
-use mateval_procedural::node::catalog::signatures;
-use mateval_procedural::node::kind::Kind;
-use mateval_procedural::node::signature::Signature;
+use mateval_procedural::node::Kind;
+use mateval_procedural::node::Signature;
+use mateval_procedural::node::signatures;
 use mateval_procedural::value::{Type, Value};
 
 use super::osl::{Input, PLACES};

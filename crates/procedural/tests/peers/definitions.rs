@@ -1,8 +1,8 @@
 //! The variants of nodes, with the defaults of their inputs, against the definitions of MaterialX' standard library.
 
-use mateval_procedural::node::catalog::signatures;
-use mateval_procedural::node::kind::Kind;
-use mateval_procedural::node::signature::{Signature, Unset};
+use mateval_procedural::node::Kind;
+use mateval_procedural::node::signatures;
+use mateval_procedural::node::{Signature, Unset};
 use serde_json::{Value, json};
 
 use super::python::with_materialx;

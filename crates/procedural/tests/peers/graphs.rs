@@ -3,9 +3,10 @@
 //! Cycles computes in single precision, so that cells may differ at their borders, and fine noise is off by the noise's
 //! slope times the rounding of its place.
 
+use mateval_procedural::evaluator::Points;
 use mateval_procedural::graph::FOOTPRINT;
-use mateval_procedural::lanes::{LANES, Points};
 use mateval_procedural::library::LIBRARY;
+use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Graph, Program, Settings};
 
 use super::osl::{Input, PLACES, evaluate};

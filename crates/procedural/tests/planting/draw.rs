@@ -5,9 +5,9 @@
 //! it is drawn from one to two defaults. Ribs of corduroy wander by a tenth of their distance; enough of them are shown
 //! for their mean distance to be known to 1 %.
 
-use mateval_procedural::fit::roles::{Role, role};
+use mateval_procedural::fit::model::{Role, role};
+use mateval_procedural::graph::{Slot, slots};
 use mateval_procedural::library::{Entry, entry};
-use mateval_procedural::settings::{Slot, slots};
 use mateval_procedural::{Graph, Settings};
 
 use super::view::random;

@@ -1,8 +1,9 @@
 //! What a camera sees of a planted pattern: at an angle, with light that is left, and noise.
 
+use mateval_procedural::evaluator::Points;
 use mateval_procedural::fit::points::Point;
-use mateval_procedural::lanes::{LANES, Points};
-use mateval_procedural::noise::cell::cell;
+use mateval_procedural::noise::cell;
+use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Graph, Program, Settings};
 
 /// Noise of each colour, relative to it (standard deviation).

@@ -1,10 +1,10 @@
 //! Derivatives in every parameter of every built-in graph against central differences.
 
 use mateval_procedural::graph::FOOTPRINT;
-use mateval_procedural::lanes::{LANES, Lanes};
+use mateval_procedural::graph::{Slot, slots};
 use mateval_procedural::library::LIBRARY;
-use mateval_procedural::program::compile::OUTPUTS;
-use mateval_procedural::settings::{Slot, slots};
+use mateval_procedural::program::OUTPUTS;
+use mateval_procedural::program::op::{LANES, Lanes};
 use mateval_procedural::{Evaluator, Graph, Program, Settings};
 
 use super::graphs::scattered;

@@ -1,7 +1,7 @@
 //! Edges and lines are as blurred as a pixel needs.
 
+use mateval_procedural::evaluator::{Pixel, Square, render};
 use mateval_procedural::library::LIBRARY;
-use mateval_procedural::picture::{Pixel, Square, render};
 use mateval_procedural::{Program, Settings};
 
 fn mean(pixels: &[Pixel]) -> [f64; 3] {

@@ -1,8 +1,9 @@
 //! Small graphs, and points, that the tests share.
 
-use mateval_procedural::lanes::{LANES, Points};
-use mateval_procedural::limits::Limits;
+use mateval_procedural::evaluator::Points;
+use mateval_procedural::mtlx::Limits;
 use mateval_procedural::mtlx::read_text;
+use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Graph, ProceduralError, Program, Settings};
 
 /// The text of a file whose graph has these inputs and nodes; `color` names the node that is the base colour.

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use mateval_procedural::graph::FOOTPRINT;
-use mateval_procedural::lanes::LANES;
+use mateval_procedural::graph::slots;
 use mateval_procedural::library::{LIBRARY, entry};
-use mateval_procedural::settings::slots;
+use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Program, Settings};
 
 use super::graphs::scattered;

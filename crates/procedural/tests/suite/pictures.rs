@@ -1,7 +1,7 @@
 //! Pictures of graphs.
 
+use mateval_procedural::evaluator::{Square, render};
 use mateval_procedural::library::entry;
-use mateval_procedural::picture::{Square, render};
 use mateval_procedural::{ProceduralError, Program, Settings};
 
 use super::graphs::{read, text};

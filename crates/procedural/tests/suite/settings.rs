@@ -1,9 +1,9 @@
 //! Parameters set from text.
 
 use mateval_procedural::Settings;
+use mateval_procedural::graph::slots;
 use mateval_procedural::library::entry;
 use mateval_procedural::mtlx::to_text;
-use mateval_procedural::settings::slots;
 
 use super::graphs::{read, text};
 

@@ -1,10 +1,23 @@
-//! The evaluation of a program at batches of points, with derivatives in chosen parameters (forward mode).
+//! The evaluation of a program at batches of points, with derivatives in chosen parameters (forward mode), and a square
+//! piece of a graph's material as pixels.
 
-use crate::kernel::{OPERANDS, Outcome, run};
-use crate::lanes::{LANES, Lanes, Points};
-use crate::program::compile::{OUTPUTS, Program};
-use crate::program::op::{Binary, Op};
-use crate::settings::Settings;
+use rayon::prelude::*;
+
+use crate::error::ProceduralError;
+use crate::graph::Settings;
+use crate::program::op::{Binary, LANES, Lanes, OPERANDS, Op, Outcome, run};
+use crate::program::{OUTPUTS, Program};
+
+/// The places of a batch. Fewer than [`LANES`] points are filled up with copies of any.
+#[derive(Clone, Debug)]
+pub struct Points {
+    /// First coordinates in metres.
+    pub u: Lanes,
+    /// Second coordinates in metres.
+    pub v: Lanes,
+    /// Extents of the points' pixels or texels in metres; 0 for exact points.
+    pub footprint: Lanes,
+}
 
 /// Evaluates a program. Results that are the same at all points are computed once, when the settings are set;
 /// derivatives that are known to be zero are not computed at all.
@@ -54,7 +67,6 @@ impl<'p> Evaluator<'p> {
         evaluator
     }
 
-    /// Changes the settings.
     pub fn set(&mut self, settings: &Settings) {
         self.settings.clear();
         self.settings.extend_from_slice(settings.numbers());
@@ -125,7 +137,6 @@ impl<'p> Evaluator<'p> {
         std::array::from_fn(|output| self.value(output)[lane])
     }
 
-    /// Carries out one instruction.
     fn step(&mut self, at: usize) {
         match self.program.ops[at] {
             Op::Number(bits) => self.values[at] = [f64::from_bits(bits); LANES],
@@ -180,6 +191,90 @@ fn dependencies(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usiz
     all
 }
 
+/// The most pixels a side: a picture of them takes 0.7 GB.
+pub const MOST_PIXELS: usize = 4096;
+
+/// A square of the domain, whose lower left corner is the origin. Its footprint is the side of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Square {
+    size_metres: f64,
+    resolution: usize,
+}
+
+/// The outputs of a material at a pixel's centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    /// Linear colour.
+    pub base_color: [f64; 3],
+    pub roughness: f64,
+    pub metallic: f64,
+}
+
+impl Square {
+    /// A square of this side in metres and in pixels. Fails unless the size is finite and above 0, and the
+    /// resolution is 1 to [`MOST_PIXELS`].
+    pub fn new(size_metres: f64, resolution: usize) -> Result<Self, ProceduralError> {
+        let fits = size_metres.is_finite() && size_metres > 0.0 && (1..=MOST_PIXELS).contains(&resolution);
+        let refused = ProceduralError::PictureSize { size_metres, resolution, most: MOST_PIXELS };
+        if fits { Ok(Self { size_metres, resolution }) } else { Err(refused) }
+    }
+
+    fn pixel_metres(&self) -> f64 {
+        self.size_metres / self.resolution as f64
+    }
+
+    /// The points of a row of pixels from column `first` on; beyond the row's end the last one is repeated.
+    fn points(&self, row: usize, first: usize) -> Points {
+        let pixel = self.pixel_metres();
+        let column = |lane: usize| (first + lane).min(self.resolution - 1);
+        let v = ((self.resolution - 1 - row) as f64 + 0.5) * pixel;
+        let u = std::array::from_fn(|lane| (column(lane) as f64 + 0.5) * pixel);
+        Points { u, v: [v; LANES], footprint: [pixel; LANES] }
+    }
+}
+
+/// Evaluates a graph at every pixel, row by row from the top. The same on any number of threads. Fails where a value is
+/// not finite.
+pub fn render(program: &Program, settings: &Settings, square: Square) -> Result<Vec<Pixel>, ProceduralError> {
+    let prepare = || Evaluator::new(program, settings, &[]);
+    let black = Pixel { base_color: [0.0; 3], roughness: 0.0, metallic: 0.0 };
+    let mut pixels = vec![black; square.resolution * square.resolution];
+    let rows = pixels.par_chunks_mut(square.resolution).enumerate();
+    let rows = rows.map_init(prepare, |evaluator, (row, pixels)| fill(pixels, evaluator, program, square, row));
+    let rows: Vec<Result<(), ProceduralError>> = rows.collect();
+    // The first row that fails, on any number of threads.
+    rows.into_iter().collect::<Result<(), _>>()?;
+    Ok(pixels)
+}
+
+/// Evaluates a row of pixels.
+fn fill(
+    pixels: &mut [Pixel],
+    evaluator: &mut Evaluator,
+    program: &Program,
+    square: Square,
+    row: usize,
+) -> Result<(), ProceduralError> {
+    for (at, batch) in pixels.chunks_mut(LANES).enumerate() {
+        let points = square.points(row, at * LANES);
+        evaluator.run(&points);
+        for (lane, place) in batch.iter_mut().enumerate() {
+            *place = pixel(program, evaluator.outputs(lane), points.u[lane], points.v[lane])?;
+        }
+    }
+    Ok(())
+}
+
+fn pixel(program: &Program, outputs: [f64; OUTPUTS], u: f64, v: f64) -> Result<Pixel, ProceduralError> {
+    const NAMES: [&str; OUTPUTS] = ["red", "green", "blue", "roughness", "metallic"];
+    if let Some(at) = outputs.iter().position(|value| !value.is_finite()) {
+        let graph = program.name.clone();
+        return Err(ProceduralError::NotFinite { graph, output: NAMES[at], u, v, value: outputs[at] });
+    }
+    let [red, green, blue, roughness, metallic] = outputs;
+    Ok(Pixel { base_color: [red, green, blue], roughness, metallic })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -196,7 +291,7 @@ mod tests {
         let graph = entry("plank").unwrap().graph().unwrap();
         let program = Program::new(&graph);
         let mut settings = Settings::defaults(&graph);
-        let first = |name: &str| crate::program::compile::first_slot(&graph, graph.parameter(name).unwrap());
+        let first = |name: &str| crate::graph::first_slot(&graph, graph.parameter(name).unwrap());
         let (grain, width) = (first("grain"), first("width"));
         let all = Evaluator::new(&program, &settings, &[]).runs.iter().filter(|runs| **runs).count();
         *settings.number_mut(grain) = 1e-12;

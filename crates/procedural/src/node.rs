@@ -1,9 +1,93 @@
-//! The variants of every supported node, with the defaults of `stdlib_defs.mtlx` of MaterialX 1.39.
+//! The supported nodes of MaterialX' standard library: their names, and the variants of each, which MaterialX calls
+//! nodedefs, with the defaults of `stdlib_defs.mtlx` of MaterialX 1.39.
 
-use super::kind::Kind;
-use super::signature::{InputDef, Signature, Unset};
-use crate::value::Type::{self, Color3, Float, Integer, Vector2, Vector3};
-use crate::value::Value;
+use crate::value::Type::{Color3, Float, Integer, Vector2, Vector3};
+use crate::value::{Type, Value};
+
+macro_rules! kinds {
+    ($($kind:ident $word:literal),* $(,)?) => {
+        /// A node of MaterialX' standard library.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[allow(missing_docs, reason = "the variants are the names of MaterialX' nodes")]
+        pub enum Kind { $($kind),* }
+
+        impl Kind {
+            pub const ALL: &[Self] = &[$(Self::$kind),*];
+
+            /// The name in `.mtlx` files.
+            pub fn word(self) -> &'static str {
+                match self { $(Self::$kind => $word),* }
+            }
+        }
+    };
+}
+
+kinds! {
+    Constant "constant", Texcoord "texcoord", Position "position", Dot "dot",
+    Add "add", Subtract "subtract", Multiply "multiply", Divide "divide", Modulo "modulo", Power "power",
+    SafePower "safepower", Min "min", Max "max", Atan2 "atan2",
+    Absval "absval", Sign "sign", Floor "floor", Ceil "ceil", Round "round", Fract "fract",
+    Sin "sin", Cos "cos", Tan "tan", Asin "asin", Acos "acos", Sqrt "sqrt", Ln "ln", Exp "exp",
+    Clamp "clamp", Invert "invert", Remap "remap", Contrast "contrast", Smoothstep "smoothstep", Mix "mix",
+    Luminance "luminance", TriangleWave "trianglewave",
+    DotProduct "dotproduct", Magnitude "magnitude", Distance "distance", Normalize "normalize", Rotate2d "rotate2d",
+    Combine2 "combine2", Combine3 "combine3", Separate2 "separate2", Separate3 "separate3", Extract "extract",
+    Convert "convert",
+    IfGreater "ifgreater", IfGreaterEq "ifgreatereq", IfEqual "ifequal", Switch "switch",
+    Noise2d "noise2d", Fractal2d "fractal2d", CellNoise2d "cellnoise2d", WorleyNoise2d "worleynoise2d",
+}
+
+impl Kind {
+    /// The node of this name.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|kind| kind.word() == word)
+    }
+}
+
+/// What an input is while a file does not set it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unset {
+    Value(Value),
+    /// The place in metres: the first set of texture coordinates.
+    Place,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputDef {
+    pub name: &'static str,
+    pub kind: Type,
+    /// Its value where a file does not set it.
+    pub unset: Unset,
+}
+
+impl InputDef {
+    pub(super) fn filled(name: &'static str, kind: Type, number: f64) -> Self {
+        Self { name, kind, unset: Unset::Value(Value::filled(kind, number)) }
+    }
+}
+
+/// A variant of a node.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signature {
+    /// The inputs, in the order of the node's arguments.
+    pub inputs: Vec<InputDef>,
+    /// The outputs. A node with one calls it `out`.
+    pub outputs: Vec<(&'static str, Type)>,
+}
+
+impl Signature {
+    pub(super) fn new(inputs: Vec<InputDef>, out: Type) -> Self {
+        Self { inputs, outputs: vec![("out", out)] }
+    }
+
+    /// The type that a file gives for the node: that of its output, or `multioutput`.
+    pub fn type_word(&self) -> &'static str {
+        match self.outputs.as_slice() {
+            [(_, kind)] => kind.word(),
+            _ => "multioutput",
+        }
+    }
+}
 
 const MATH: [Type; 4] = [Float, Color3, Vector2, Vector3];
 const VECTORS: [Type; 2] = [Vector2, Vector3];
