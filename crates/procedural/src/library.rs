@@ -2,8 +2,7 @@
 
 use crate::error::ProceduralError;
 use crate::graph::Graph;
-use crate::mtlx::Limits;
-use crate::mtlx::read_text;
+use crate::mtlx::{Limits, read_text};
 
 /// What kind of pattern a graph makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -198,8 +198,9 @@ pub fn nearest_cell(x: f64, y: f64, jitter: f64, channel: Channel) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use proptest::prelude::*;
+
+    use super::*;
 
     #[test]
     fn neighbouring_cells_have_unrelated_hashes() {

@@ -6,20 +6,16 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::uv_atlas::UvAtlas;
 use rayon::prelude::*;
 
-use super::part_material::{PartMaterial, completed};
-use super::residuals::Residuals;
-use super::scene_materials::SceneMaterials;
+use super::materials::{PartMaterial, Residuals, SceneMaterials, completed};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
-use crate::geometry::SceneGeometry;
+use crate::geometry::{SceneGeometry, SeenPixels};
 use crate::lift::{PartialAtlas, Texel, lift, place_of, texel_size_m};
 use crate::maps::Maps;
-use crate::seen::SeenPixels;
 
 /// Texels that are evaluated together.
 const TEXELS: usize = 4096;
 
-/// An instance's maps.
 pub struct Baked {
     /// The maps, with filled gutters.
     pub maps: Maps,
@@ -49,7 +45,6 @@ pub(super) fn bake_all(
     Ok(())
 }
 
-/// Completes an instance's atlas.
 fn bake(
     materials: &SceneMaterials<'_>,
     geometry: &SceneGeometry<'_>,

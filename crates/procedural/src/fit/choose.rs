@@ -12,26 +12,16 @@
 
 use std::sync::Arc;
 
-use super::candidate::Candidate;
-use super::candidate::log_odds;
-use super::candidate::unusual;
-use super::cells::better;
-use super::cells::settled;
-use super::cells::{cell_error, excess, without_tones};
-use super::least_squares::flattened;
-use super::least_squares::polish;
-use super::least_squares::{mean_square, project};
-use super::model::Model;
-use super::model::Role;
-use super::model::layout;
+use super::candidate::{Candidate, log_odds, unusual};
+use super::cells::{better, cell_error, excess, settled, without_tones};
+use super::least_squares::{flattened, mean_square, polish, project};
+use super::model::{Model, Role, layout};
 use super::points::{Point, split, thinned};
-use super::starts::Pattern;
-use super::starts::{Start, starts};
+use super::starts::{Pattern, Start, starts};
 use super::texture::{Colors, Sight, Texture};
 use super::waves::{Wave, lines, waves};
 use crate::error::ProceduralError;
-use crate::graph::Graph;
-use crate::graph::Settings;
+use crate::graph::{Graph, Settings};
 use crate::library::{Class, LIBRARY, entry};
 
 /// The graph of one colour.

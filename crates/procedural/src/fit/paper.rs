@@ -15,8 +15,7 @@
 
 use super::candidate::Candidate;
 use super::choose::{Fit, Fitter};
-use super::model::Model;
-use super::model::{Role, role};
+use super::model::{Model, Role, role};
 use super::points::{Point, median, split};
 use super::statistics::Pairs;
 use crate::error::ProceduralError;

@@ -2,9 +2,7 @@
 
 use mateval_procedural::Graph;
 use mateval_procedural::graph::{Node, Parameter, Source};
-use mateval_procedural::node::Kind;
-use mateval_procedural::node::Signature;
-use mateval_procedural::node::signatures;
+use mateval_procedural::node::{Kind, Signature, signatures};
 use mateval_procedural::value::{Type, Value};
 
 use super::osl::{Input, PLACES};

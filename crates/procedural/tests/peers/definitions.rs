@@ -1,8 +1,6 @@
 //! The variants of nodes, with the defaults of their inputs, against the definitions of MaterialX' standard library.
 
-use mateval_procedural::node::Kind;
-use mateval_procedural::node::signatures;
-use mateval_procedural::node::{Signature, Unset};
+use mateval_procedural::node::{Kind, Signature, Unset, signatures};
 use serde_json::{Value, json};
 
 use super::python::with_materialx;

@@ -1,7 +1,6 @@
 //! Derivatives in every parameter of every built-in graph against central differences.
 
-use mateval_procedural::graph::FOOTPRINT;
-use mateval_procedural::graph::{Slot, slots};
+use mateval_procedural::graph::{FOOTPRINT, Slot, slots};
 use mateval_procedural::library::LIBRARY;
 use mateval_procedural::program::OUTPUTS;
 use mateval_procedural::program::op::{LANES, Lanes};

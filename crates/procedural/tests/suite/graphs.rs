@@ -1,8 +1,7 @@
 //! Small graphs, and points, that the tests share.
 
 use mateval_procedural::evaluator::Points;
-use mateval_procedural::mtlx::Limits;
-use mateval_procedural::mtlx::read_text;
+use mateval_procedural::mtlx::{Limits, read_text};
 use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Graph, ProceduralError, Program, Settings};
 

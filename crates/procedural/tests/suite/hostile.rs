@@ -2,8 +2,7 @@
 
 use mateval_procedural::ProceduralError;
 use mateval_procedural::error::Code;
-use mateval_procedural::mtlx::Limits;
-use mateval_procedural::mtlx::read_text;
+use mateval_procedural::mtlx::{Limits, read_text};
 
 use super::graphs::{findings, read, text};
 

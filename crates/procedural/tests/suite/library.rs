@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use mateval_procedural::graph::FOOTPRINT;
-use mateval_procedural::graph::slots;
+use mateval_procedural::graph::{FOOTPRINT, slots};
 use mateval_procedural::library::{LIBRARY, entry};
 use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Program, Settings};

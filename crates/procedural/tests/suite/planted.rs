@@ -3,8 +3,7 @@
 use mateval_procedural::fit::choose::{Fit, Fitter};
 use mateval_procedural::fit::points::Point;
 use mateval_procedural::library::{Class, entry};
-use mateval_procedural::mtlx::Limits;
-use mateval_procedural::mtlx::read_text;
+use mateval_procedural::mtlx::{Limits, read_text};
 use mateval_procedural::{Graph, ProceduralError, Settings};
 use rayon::prelude::*;
 

@@ -1,22 +1,25 @@
-//! A scene's parts as a room with possible lights, and the photo of it.
+//! A scene's parts as a room with the lights that may shine in it, and the photo of it.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec2;
 use mateval_image::exr_io::read_linear;
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
-use mateval_light::candidates::{Candidate, add_candidates};
-use mateval_light::light_stage::scene_lights;
+use mateval_light::candidates::{Candidate, add_candidates, sky_extent_deg};
+use mateval_light::light_stage::{NamedLight, scene_lights};
 use mateval_light::rules::StageRules;
+use mateval_scene::dataset::Instance;
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Camera, SceneError};
+use mateval_scene::material::{ColorInput, Material, MaterialModel};
+use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_scene::{Camera, SceneError, glb};
 use mateval_tracer::aov::PixelHit;
 use mateval_tracer::{World, aov};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use super::options::CandidateLights;
-use super::part_surfaces::{NO_PART, PartSurfaces};
-use super::possible_light::{PossibleLight, make_names_distinct};
+use super::CandidateLights;
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
 
@@ -146,4 +149,145 @@ fn mean_of_pixels(photo: &Picture<LinearRgb>, emission: &Picture<Option<usize>>,
         count += 1;
     }
     (count >= LEAST_PIXELS).then(|| sum.map(|v| v / count as f64))
+}
+
+/// The pixel shows no part.
+pub(super) const NO_PART: u16 = u16::MAX;
+
+/// One surface for each part of an instance that has an atlas. Glass has none: light passes it.
+pub(super) struct PartSurfaces {
+    /// The surfaces, without lights.
+    pub(super) room: ReferenceScene,
+    /// The instance of each surface.
+    pub(super) owners: Vec<usize>,
+    /// The surface of each index in `part.png`.
+    pub(super) of_part: BTreeMap<u16, u16>,
+}
+
+impl PartSurfaces {
+    /// Reads `parts.glb`. Fails if its nodes are not the parts of `scene.json`.
+    pub(super) fn read(geometry: &SceneGeometry<'_>) -> Result<Self, BaselineError> {
+        let (scene, path) = (geometry.scene, geometry.folder.parts(None));
+        let instance_at: BTreeMap<&str, usize> =
+            scene.instances.iter().enumerate().map(|(at, instance)| (instance.id.as_str(), at)).collect();
+        let nodes = glb::read(&path)?;
+        let unsupported = |what: &str| SceneError::Unsupported { path: path.clone(), what: what.to_owned() };
+        if !nodes.iter().map(|node| node.name.as_str()).eq(scene.parts.iter().map(|part| part.id.as_str())) {
+            return Err(unsupported("its nodes are not the parts of scene.json; run `mateval prep verify`").into());
+        }
+        let room = ReferenceScene { materials: vec![grey()], ..ReferenceScene::default() };
+        let mut found = Self { room, owners: Vec::new(), of_part: BTreeMap::new() };
+        for (part, node) in scene.parts.iter().zip(nodes) {
+            let owner = instance_at.get(part.instance.as_str()).copied();
+            let Some(owner) = owner.filter(|owner| scene.instances[*owner].atlas.is_some()) else { continue };
+            let surface = u16::try_from(found.owners.len()).ok().filter(|surface| *surface != NO_PART);
+            let surface = surface.ok_or_else(|| unsupported("it has more parts than part.png can hold"))?;
+            found.of_part.insert(part.index.0.get(), surface);
+            found.owners.push(owner);
+            found.room.surfaces.push(Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) });
+        }
+        Ok(found)
+    }
+}
+
+/// A material that no path asks for: what is assumed of surfaces takes its place.
+fn grey() -> Material {
+    Material {
+        name: String::new(),
+        model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
+        two_sided: true,
+        opacity: None,
+        bump: None,
+    }
+}
+
+/// A light that may shine, of radiance 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PossibleLight {
+    /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage; unique in its
+    /// scene.
+    pub name: String,
+    pub source: LightSource,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum LightSource {
+    /// Both sides of all surfaces of an instance.
+    Instance { instance: String },
+    /// Both sides of all ceilings.
+    Ceilings {},
+    /// The world around, alike in all directions.
+    World {},
+    /// A part of the world around.
+    Sky {
+        /// From and to: 0 is -Z, 90 is +X.
+        azimuth_deg: [f32; 2],
+        /// From and to: 90 is +Y, straight up.
+        elevation_deg: [f32; 2],
+    },
+    /// The front of a quad of the light stage. It casts no shadow, and surfaces reflect it diffusely alone.
+    Quad {
+        /// World space, anticlockwise as seen from the front.
+        corners_m: Vec<[f32; 3]>,
+    },
+}
+
+/// A light with the radiance that was fitted to it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FittedLight {
+    #[serde(flatten)]
+    pub light: PossibleLight,
+    /// Linear Rec. 709, before the scene's exposure.
+    pub radiance: [f64; 3],
+}
+
+impl PossibleLight {
+    /// A candidate among the instances of a scene.
+    fn of_candidate(name: String, candidate: Candidate, instances: &[Instance]) -> Self {
+        let source = match candidate {
+            Candidate::Instance(at) => LightSource::Instance { instance: instances[at].id.to_string() },
+            Candidate::Ceilings => LightSource::Ceilings {},
+            Candidate::World => LightSource::World {},
+            Candidate::Sky(sector) => {
+                let [azimuth_deg, elevation_deg] = sky_extent_deg(sector);
+                LightSource::Sky { azimuth_deg, elevation_deg }
+            }
+        };
+        Self { name, source }
+    }
+
+    fn of_stage(light: &NamedLight) -> Self {
+        let mesh = &light.light.mesh;
+        // The front is where the corners of the first triangle run anticlockwise.
+        let order = if mesh.triangles[0] == [0, 1, 2] { [0, 1, 2, 3] } else { [0, 3, 2, 1] };
+        let corners_m = order.map(|corner| mesh.positions[corner].to_array()).to_vec();
+        Self { name: light.name.clone(), source: LightSource::Quad { corners_m } }
+    }
+}
+
+/// Numbers the lights that share a name with an earlier one: an instance may be called `camera`, as is a light of the
+/// stage. The second `camera` becomes `camera#2`, which no id can be.
+fn make_names_distinct(lights: &mut [PossibleLight]) {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for light in lights {
+        let count = counts.entry(light.name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            light.name = format!("{}#{count}", light.name);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_distinct() {
+        let light = |name: &str| PossibleLight { name: name.to_owned(), source: LightSource::World {} };
+        let mut lights = ["camera", "world", "camera", "camera"].map(light);
+        make_names_distinct(&mut lights);
+        assert_eq!(lights.map(|light| light.name), ["camera", "world", "camera#2", "camera#3"]);
+    }
 }

@@ -1,22 +1,94 @@
-//! The material of a part: a fitted graph, or one colour.
+//! The materials of all parts of a scene: for each a fitted graph, or one colour.
+//!
+//! Light and colour that is left in an estimate changes slowly, so that a pattern of few wide stripes predicts it well,
+//! and so do its neighbours. Only what they do not predict speaks for a pattern.
+//!
+//! A material continues a pattern. What remains of the estimate, such as a stain, wear or light that was not taken out,
+//! changes slowly. This residual at a place that the input view does not show is estimated by the mean of the residuals
+//! of the nearest seen points, weighted by their distance (Nadaraya 1964, Watson 1964) and drawn to 0 where none is near.
 
 use std::array::from_fn;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
+use glam::DVec3;
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter, LEAST_POINTS};
 use mateval_procedural::fit::paper::fit_as_paper;
-use mateval_procedural::fit::points::Point;
+use mateval_procedural::fit::points::{Point, split};
 use mateval_procedural::graph::slots;
 use mateval_procedural::library::Class;
 use mateval_procedural::value::Type;
+use mateval_scene::dataset::Instance;
+use mateval_scene::{Progress, Report};
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
 
-use super::interpolation::interpolation_error;
-use super::options::{FitMode, ProceduralOptions};
 use super::part_frame::{Chart, PartFrame};
-use super::part_samples::PartSamples;
+use super::part_samples::{PartSamples, Sample};
+use super::{FitMode, ProceduralOptions};
 use crate::error::BaselineError;
-use crate::estimate::{GivenMaps, Values};
-use crate::median::{DEFAULT, median};
+use crate::estimate::{Estimate, GivenMaps, Values};
+use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels};
+use crate::maps::{DEFAULT, Medians, median};
+
+/// The parts of a scene with what was seen of each and its material.
+pub(super) struct SceneMaterials<'a> {
+    pub(super) triangles: PartTriangles<'a>,
+    pub(super) samples: Vec<PartSamples>,
+    pub(super) of_part: Vec<PartMaterial>,
+    /// By how much the estimate differs from each part's material; none unless seen texels are kept.
+    pub(super) residuals: Option<Vec<Residuals>>,
+    /// The maps that the estimate gives.
+    pub(super) given: GivenMaps,
+}
+
+impl<'a> SceneMaterials<'a> {
+    /// Fits all parts, several at once. The same on any number of threads.
+    pub(super) fn fitted(
+        geometry: &SceneGeometry<'a>,
+        estimate: &Estimate,
+        seen: &SeenPixels,
+        fitter: &Fitter,
+        options: &ProceduralOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self, BaselineError> {
+        options.check()?;
+        let given = estimate.given_maps();
+        if !given.base_color {
+            return Err(BaselineError::NoColor(geometry.scene.id.to_string()));
+        }
+        let set = options.part_set.as_ref();
+        let triangles = PartTriangles::read(geometry, set)?;
+        let samples_of_parts = PartSamples::of_parts(geometry, set, &triangles, estimate, seen)?;
+        let medians = Medians::new(geometry, seen, estimate);
+        let done = AtomicUsize::new(0);
+        let fitted = |(part, samples): (usize, &PartSamples)| {
+            let owner = triangles.owners[part];
+            let category = owner.and_then(|owner| category(&geometry.scene.instances[owner]));
+            let unseen = owner.map_or(DEFAULT, |owner| medians.of(geometry, owner));
+            let material = PartMaterial::fitted(fitter, samples, category, options, given, unseen);
+            progress(Report::step("fit of parts", 1 + done.fetch_add(1, Ordering::Relaxed), samples_of_parts.len()));
+            material
+        };
+        let of_part = samples_of_parts.par_iter().enumerate().map(fitted).collect::<Result<Vec<_>, _>>()?;
+        let samples = samples_of_parts;
+        let residuals = |(samples, material)| Residuals::new(samples, material, given);
+        let residuals = options.keep_seen.then(|| samples.iter().zip(&of_part).map(residuals).collect());
+        Ok(Self { triangles, samples, of_part, residuals, given })
+    }
+
+    /// Whether any part of an instance has a graph.
+    pub(super) fn has_graph(&self, instance: usize) -> bool {
+        let mut parts = self.triangles.owners.iter().zip(&self.of_part);
+        parts.any(|(owner, material)| *owner == Some(instance) && material.graph.is_some())
+    }
+}
+
+/// An instance's category, or the kind of a piece of the building.
+fn category(instance: &Instance) -> Option<&str> {
+    instance.category.as_deref().or(instance.role.architecture_kind())
+}
 
 /// The most samples of a part that are looked at.
 const MOST_SAMPLES: usize = 8192;
@@ -46,11 +118,9 @@ pub(super) enum Reason {
     FewPixels,
     /// No graph is better than one colour: it has the median of its pixels.
     OneColor(Fit),
-    /// A graph is better.
     Graph(Fit),
 }
 
-/// The material of a part.
 #[derive(Clone, Debug)]
 pub(super) struct PartMaterial {
     /// The median of its pixels, or what stands for them.
@@ -190,12 +260,78 @@ fn is_flat(found: &Candidate) -> bool {
     found.class == Some(Class::Flat)
 }
 
+/// The number of neighbours whose mean is the prediction.
+const PREDICTORS: usize = 16;
+
+/// The most held-out points that are predicted.
+const MOST_POINTS: usize = 1024;
+
+/// The mean square of the differences between held-out points and the mean of the points nearest to them that are not
+/// held out; none where there are none of either.
+fn interpolation_error(points: &[Point]) -> Option<f64> {
+    let (seen, held_out) = split(points);
+    if seen.is_empty() || held_out.is_empty() {
+        return None;
+    }
+    let tree = RTree::bulk_load(seen.iter().map(|point| GeomWithData::new([point.u, point.v], point.albedo)).collect());
+    let judged = &held_out[..held_out.len().min(MOST_POINTS)];
+    let square = |point: &Point| {
+        let nearest = tree.nearest_neighbor_iter(&[point.u, point.v]).take(PREDICTORS);
+        let (sum, count) = nearest.fold(([0.0; 3], 0.0), |(sum, count), near| {
+            (std::array::from_fn(|channel| sum[channel] + near.data[channel]), count + 1.0)
+        });
+        let of_channel = |channel: usize| (sum[channel] / count - point.albedo[channel]).powi(2);
+        (0..3).map(of_channel).sum::<f64>() / 3.0
+    };
+    Some(judged.iter().map(square).sum::<f64>() / judged.len() as f64)
+}
+
+/// The number of points that are averaged.
+const NEIGHBOURS: usize = 32;
+
+/// The distance, in metres, at which a point has a quarter of its weight.
+const REACH_METRES: f64 = 0.15;
+
+/// The weight of a residual of 0, in points of full weight.
+const PRIOR: f64 = 0.1;
+
+/// A point with the difference of base colours, estimate less material, linear.
+type Residual = GeomWithData<[f32; 3], [f32; 3]>;
+
+/// The residuals at the points of a part.
+pub(super) struct Residuals(RTree<Residual>);
+
+impl Residuals {
+    /// The residuals at all samples of a part.
+    pub(super) fn new(part: &PartSamples, material: &PartMaterial, given: GivenMaps) -> Self {
+        let shown = material.at(&part.places(), given);
+        let point = |(sample, shown): (&Sample, Values)| {
+            let difference = std::array::from_fn(|channel| sample.values[channel] - shown[channel]);
+            GeomWithData::new(sample.position.as_vec3().to_array(), difference)
+        };
+        Self(RTree::bulk_load(part.samples.iter().zip(shown).map(point).collect()))
+    }
+
+    /// The residual to be expected at a place in world space.
+    pub(super) fn at(&self, place: DVec3) -> [f32; 3] {
+        let (mut sum, mut total) = ([0.0_f64; 3], PRIOR);
+        let nearest = self.0.nearest_neighbor_iter_with_distance_2(&place.as_vec3().to_array());
+        for (point, distance_2) in nearest.take(NEIGHBOURS) {
+            let weight = (1.0 + f64::from(distance_2) / REACH_METRES.powi(2)).powi(-2);
+            sum.iter_mut().zip(point.data).for_each(|(sum, value)| *sum += weight * f64::from(value));
+            total += weight;
+        }
+        sum.map(|sum| (sum / total) as f32)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use mateval_procedural::Settings;
     use mateval_procedural::library::entry;
+    use mateval_procedural::noise::cell;
 
     use super::*;
 
@@ -251,5 +387,35 @@ mod tests {
         assert_eq!([chosen(granite, 0.3), chosen(granite, 0.9)], [name("granite"), None]);
         // Of two that predict the same, the one with fewer numbers is taken.
         assert_eq!(chosen([("stripes", 1.0e-4), ("plaid", 1.0e-4), ("paint", 3.0e-4)], 0.2), name("plaid"));
+    }
+
+    fn error(color: impl Fn(f64, f64) -> f64) -> f64 {
+        let point = |at: u32| {
+            let [u, v] = [0.5, 1.5].map(|row| 2.0 * cell(f64::from(at) + 0.5, row));
+            Point { u, v, footprint: 0.01, albedo: [color(u, v); 3], weight: 1.0 }
+        };
+        interpolation_error(&(0..4096).map(point).collect::<Vec<_>>()).unwrap()
+    }
+
+    /// Slow changes are predicted, and fine stripes are not.
+    #[test]
+    fn neighbours_predict_what_changes_slowly() {
+        let slow = error(|u, _| 0.5 + 0.2 * (1.5 * u).sin());
+        let stripes = error(|u, _| if (u / 0.1).fract() < 0.5 { 0.7 } else { 0.3 });
+        assert!(slow < 1e-3 && stripes > 0.02, "{slow} {stripes}");
+        assert_eq!(interpolation_error(&[]), None);
+    }
+
+    /// Near seen points the residual is theirs, far away it is 0.
+    #[test]
+    fn residuals_fade() {
+        let point =
+            |at: u16| GeomWithData::new([f32::from(at % 16) * 0.01, f32::from(at / 16) * 0.01, 0.0], [0.1, -0.2, 0.0]);
+        let residuals = Residuals(RTree::bulk_load((0..256).map(point).collect()));
+        let near = residuals.at(DVec3::new(0.08, 0.08, 0.0));
+        assert!((near[0] - 0.1).abs() < 0.002 && (near[1] + 0.2).abs() < 0.003 && near[2] == 0.0, "{near:?}");
+        let [closer, farther] = [0.5, 5.0].map(|x| residuals.at(DVec3::new(x, 0.0, 0.0))[0]);
+        assert!(near[0] > closer && closer > 0.05 && farther < 0.005, "{closer} {farther}");
+        assert_eq!(Residuals(RTree::new()).at(DVec3::ZERO), [0.0; 3]);
     }
 }
