@@ -7,10 +7,7 @@ use mateval_procedural::mtlx::{Limits, read_text};
 use mateval_procedural::{Graph, ProceduralError, Settings};
 use rayon::prelude::*;
 
-use crate::planting::draw::{Draw, LENGTHS, draw, slot};
-use crate::planting::lattice::lattice_errors;
-use crate::planting::outcome::{Outcome, find, judged, outcome_as_paper, psnr};
-use crate::planting::view::seen;
+use crate::planting::{Draw, LENGTHS, Outcome, draw, find, judged, lattice_errors, outcome_as_paper, psnr, seen, slot};
 
 /// The settings of a graph with some changed.
 fn settings_of(graph: &Graph, set: &[(&str, &str)]) -> Settings {
