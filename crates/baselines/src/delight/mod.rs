@@ -246,7 +246,14 @@ fn weighted(halves: &[SplitLight; 2], weights: &[[f64; 3]]) -> Result<LightHalve
 /// The light without noise, and the photo divided by it.
 fn fitted_light(room: &PartRoom, halves: &LightHalves) -> RoundLight {
     let (diffuse, gloss) = (filtered(room, &halves.diffuse), filtered(room, &halves.gloss));
-    let base_color = divided(room, &diffuse, &gloss);
+    let least = LEAST_SHADING * mean(room);
+    let base_color = Picture::from_fn(room.photo.width(), room.photo.height(), |x, y| {
+        if !room.valid.get(x, y) {
+            return LinearRgb::default();
+        }
+        let [photo, diffuse, gloss] = [&room.photo, &diffuse, &gloss].map(|picture| picture.get(x, y).0);
+        LinearRgb([0, 1, 2].map(|c| ((photo[c] - gloss[c]) / diffuse[c].max(least)).clamp(0.0, 1.0)))
+    });
     RoundLight { diffuse, gloss, base_color }
 }
 
@@ -255,18 +262,6 @@ fn filtered(room: &PartRoom, [a, b]: &[Picture<LinearRgb>; 2]) -> Picture<Linear
     let surfaces =
         noise_filter::Surfaces { base_color: None, instances: &room.parts, normals: &room.normals, valid: &room.valid };
     filtered_mean([a, b], &surfaces)
-}
-
-/// The photo without its light.
-fn divided(room: &PartRoom, diffuse: &Picture<LinearRgb>, gloss: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    let least = LEAST_SHADING * mean(room);
-    Picture::from_fn(room.photo.width(), room.photo.height(), |x, y| {
-        if !room.valid.get(x, y) {
-            return LinearRgb::default();
-        }
-        let [photo, diffuse, gloss] = [&room.photo, diffuse, gloss].map(|picture| picture.get(x, y).0);
-        LinearRgb([0, 1, 2].map(|c| ((photo[c] - gloss[c]) / diffuse[c].max(least)).clamp(0.0, 1.0)))
-    })
 }
 
 /// The mean luminance of the photo's valid pixels, above 0.

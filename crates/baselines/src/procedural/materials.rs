@@ -14,7 +14,7 @@ use glam::DVec3;
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter, LEAST_POINTS};
 use mateval_procedural::fit::paper::fit_as_paper;
-use mateval_procedural::fit::points::{Point, split};
+use mateval_procedural::fit::{Point, split};
 use mateval_procedural::graph::slots;
 use mateval_procedural::library::Class;
 use mateval_procedural::value::Type;

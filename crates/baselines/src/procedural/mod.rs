@@ -23,7 +23,6 @@ use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
 use mateval_procedural::library::entry;
 use mateval_procedural::mtlx::{Limits, read_file};
-use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{PartSetId, Progress, SceneError, json};
@@ -40,24 +39,6 @@ use materials::SceneMaterials;
 use report::{
     REPORT, REPORT_FORMAT, ReportFile, SceneReport, ShownScene, html, library_sha256, write_graphs, write_pictures,
 };
-
-/// The maps of every instance of a scene that has an atlas, by its place in the scene: what [`write()`] writes, without
-/// files.
-pub fn scene_maps(
-    geometry: &SceneGeometry<'_>,
-    estimate: &Estimate,
-    options: &ProceduralOptions,
-    progress: Progress<'_>,
-) -> Result<BTreeMap<usize, Baked>, BaselineError> {
-    let seen = seen_pixels(geometry, estimate)?;
-    let materials = SceneMaterials::fitted(geometry, estimate, &seen, &fitter(options)?, options, progress)?;
-    let mut all = BTreeMap::new();
-    bake_all(&materials, geometry, estimate, &seen, options.keep_seen, |at, baked| {
-        all.insert(at, baked);
-        Ok(())
-    })?;
-    Ok(all)
-}
 
 /// How a graph is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,10 +108,25 @@ pub fn write(
     let mut scenes = Vec::new();
     let method = method(dataset, source, options);
     let instances = submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
-        let maker = SceneMaker { dataset, scene, source, options, progress };
-        let (instances, report) = maker.make(&fitter, folder, work.path())?;
-        scenes.push(report);
-        Ok(instances)
+        let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
+        let estimate = source.read(dataset, scene, progress)?;
+        let seen = seen_pixels(&geometry, &estimate)?;
+        let materials = SceneMaterials::fitted(&geometry, &estimate, &seen, &fitter, options, progress)?;
+        // The maps of the instances.
+        let mut count = 0;
+        bake_all(&materials, &geometry, &estimate, &seen, options.keep_seen, |at, baked| {
+            count += 1;
+            baked.maps.write(&folder.join(scene.instances[at].id.as_str()))
+        })?;
+        // The scene's folder of the report.
+        let place = work.path().join(scene.id.as_str());
+        std::fs::create_dir_all(&place).map_err(SceneError::io("make", &place))?;
+        write_graphs(&place.join("materials.mtlx"), &materials)?;
+        let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
+        let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;
+        let has_photo = write_pictures(&place, photo.as_ref(), &estimate, &materials)?;
+        scenes.push(ShownScene { report: SceneReport::new(scene, &materials), has_photo });
+        Ok(count)
     })?;
     let index = work.path().join("index.html");
     std::fs::write(&index, html(&method, &scenes)).map_err(SceneError::io("write", &index))?;
@@ -144,6 +140,24 @@ pub fn write(
     json::write(&work.path().join(REPORT), &file)?;
     work.finish()?;
     Ok(instances)
+}
+
+/// The maps of every instance of a scene that has an atlas, by its place in the scene: what [`write()`] writes, without
+/// files.
+pub fn scene_maps(
+    geometry: &SceneGeometry<'_>,
+    estimate: &Estimate,
+    options: &ProceduralOptions,
+    progress: Progress<'_>,
+) -> Result<BTreeMap<usize, Baked>, BaselineError> {
+    let seen = seen_pixels(geometry, estimate)?;
+    let materials = SceneMaterials::fitted(geometry, estimate, &seen, &fitter(options)?, options, progress)?;
+    let mut all = BTreeMap::new();
+    bake_all(&materials, geometry, estimate, &seen, options.keep_seen, |at, baked| {
+        all.insert(at, baked);
+        Ok(())
+    })?;
+    Ok(all)
 }
 
 /// The method's name, and all choices that were made.
@@ -169,40 +183,6 @@ fn method(dataset: &Dataset, source: &EstimateSource, options: &ProceduralOption
         &library_sha256()[..12]
     );
     Method { name, description, assumed_encodings: source.assumed_encodings() }
-}
-
-/// Makes one scene's maps and report.
-struct SceneMaker<'a> {
-    dataset: &'a Dataset,
-    scene: &'a SceneFile,
-    source: &'a EstimateSource,
-    options: &'a ProceduralOptions,
-    progress: Progress<'a>,
-}
-
-impl SceneMaker<'_> {
-    /// `folder` receives the instances' folders, `report` the scene's folder of the report. Returns the number of
-    /// instances.
-    fn make(&self, fitter: &Fitter, folder: &Path, report: &Path) -> Result<(usize, ShownScene), BaselineError> {
-        let scene = self.scene;
-        let geometry = SceneGeometry::read(self.dataset.folder(&scene.id), scene)?;
-        let estimate = self.source.read(self.dataset, scene, self.progress)?;
-        let seen = seen_pixels(&geometry, &estimate)?;
-        let materials = SceneMaterials::fitted(&geometry, &estimate, &seen, fitter, self.options, self.progress)?;
-        let mut count = 0;
-        bake_all(&materials, &geometry, &estimate, &seen, self.options.keep_seen, |at, baked| {
-            count += 1;
-            baked.maps.write(&folder.join(scene.instances[at].id.as_str()))
-        })?;
-        let place = report.join(scene.id.as_str());
-        std::fs::create_dir_all(&place).map_err(SceneError::io("make", &place))?;
-        write_graphs(&place.join("materials.mtlx"), &materials)?;
-        let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
-        let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;
-        let has_photo = write_pictures(&place, photo.as_ref(), &estimate, &materials)?;
-        let shown = ShownScene { report: SceneReport::new(scene, &materials), has_photo };
-        Ok((count, shown))
-    }
 }
 
 /// The most files that are read.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use mateval_procedural::fit::points::Point;
+use mateval_procedural::fit::Point;
 use mateval_procedural::noise::cell;
 use mateval_scene::{Camera, PartSetId};
 

@@ -4,9 +4,9 @@
 
 use std::sync::Arc;
 
+use super::Point;
 use super::least_squares::mean_square;
 use super::model::{Model, Role, is_length, role};
-use super::points::Point;
 use crate::evaluator::{Evaluator, Points};
 use crate::graph::{Graph, Settings, slots};
 use crate::library::Class;

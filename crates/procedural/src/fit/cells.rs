@@ -10,7 +10,7 @@
 
 use super::least_squares::{log_grey, project};
 use super::model::{Layout, Model};
-use super::points::{Point, extent};
+use super::{Point, extent};
 use crate::graph::Settings;
 
 /// Points of which less than this is a cell belong to its joint.

@@ -8,7 +8,7 @@
 //! The systems need only +, -, *, / and square roots in a fixed order: the same bytes on every machine.
 
 use super::model::Model;
-use super::points::{Point, extent};
+use super::{Point, extent};
 use crate::graph::Settings;
 
 /// The normal equations of a linear least squares problem.

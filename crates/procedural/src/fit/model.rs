@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::points::Point;
+use super::Point;
 use crate::evaluator::{Evaluator, Points};
 use crate::graph::{FOOTPRINT, Graph, Settings, Slot, slots};
 use crate::library::Class;

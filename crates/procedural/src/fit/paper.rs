@@ -16,8 +16,8 @@
 use super::candidate::Candidate;
 use super::choose::{Fit, Fitter};
 use super::model::{Model, Role, role};
-use super::points::{Point, median, split};
 use super::statistics::Pairs;
+use super::{Point, median, split};
 use crate::error::ProceduralError;
 use crate::graph::Settings;
 

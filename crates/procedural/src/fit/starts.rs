@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::cells::cell_error;
 use super::least_squares::project;
 use super::model::{Layout, Model};
-use super::points::{Point, extent, thinned};
 use super::waves::{Signal, Wave, waves};
+use super::{Point, extent, thinned};
 use crate::graph::Settings;
 use crate::noise::cell;
 

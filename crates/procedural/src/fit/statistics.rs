@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use super::least_squares::{FLOOR, smooth_part_of};
-use super::points::{Point, extent, median};
+use super::{Point, extent, median};
 use crate::noise::cell;
 
 pub(super) const SCALES: usize = 9;

@@ -6,8 +6,8 @@
 
 use super::least_squares::{Normal, RANGE};
 use super::model::{Model, Role};
-use super::points::{Point, extent, median};
 use super::statistics::{COUNT, DIRECTIONS, Target, bounded, spread};
+use super::{Point, extent, median};
 use crate::graph::Settings;
 use crate::library::Class;
 

@@ -10,7 +10,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::least_squares::{log_grey, smooth_part};
-use super::points::{Point, extent, median};
+use super::{Point, extent, median};
 
 /// Fewer points cannot distinguish a wave from chance.
 const LEAST_POINTS: usize = 50;

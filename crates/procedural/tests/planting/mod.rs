@@ -14,11 +14,11 @@
 #![allow(dead_code, reason = "tests and the bench use different parts")]
 
 use mateval_procedural::evaluator::Points;
+use mateval_procedural::fit::Point;
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter};
 use mateval_procedural::fit::model::{Role, role};
 use mateval_procedural::fit::paper::fit_as_paper;
-use mateval_procedural::fit::points::Point;
 use mateval_procedural::graph::{Slot, slots};
 use mateval_procedural::library::{Entry, entry};
 use mateval_procedural::noise::cell;

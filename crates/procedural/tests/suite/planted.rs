@@ -1,7 +1,7 @@
 //! Fits of graphs to points that graphs have made: at an angle, with light that is left, and noise.
 
+use mateval_procedural::fit::Point;
 use mateval_procedural::fit::choose::{Fit, Fitter};
-use mateval_procedural::fit::points::Point;
 use mateval_procedural::library::{Class, entry};
 use mateval_procedural::mtlx::{Limits, read_text};
 use mateval_procedural::{Graph, ProceduralError, Settings};
