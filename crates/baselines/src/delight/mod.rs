@@ -15,20 +15,18 @@ pub mod relight;
 mod room;
 mod surfaces;
 
-use std::collections::BTreeMap;
-
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_light::joint_fit::{JointFit, JointFitRules, JointTarget, fit_jointly};
+use mateval_light::joint_fit::{JointFitRules, JointTarget, fit_jointly};
 use mateval_scene::{Progress, Report};
-use mateval_tracer::noise_filter::filtered_mean;
-use mateval_tracer::{PhotoCache, SplitLight, noise_filter, split_light};
+use mateval_tracer::noise_filter::{self, filtered_mean};
+use mateval_tracer::{PhotoCache, SplitLight, split_light};
 use serde::{Deserialize, Serialize};
 
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::geometry::SceneGeometry;
 pub use files::write;
-use mirrors::{Mirror, find_mirrors};
+use mirrors::find_mirrors;
 use room::PartRoom;
 pub use room::{FittedLight, LightSource, PossibleLight};
 use surfaces::{Surfaces, USUAL_ROUGHNESS, choose_roughness, part_colors, settings};
@@ -131,7 +129,7 @@ fn run(room: &PartRoom, options: &DelightOptions, progress: Progress<'_>) -> Res
     let cache = PhotoCache::new(&room.world, &room.camera, &room.photo, cached)?;
     let mut surfaces = Surfaces::unknown(room.owners.len());
     let mut round = 0;
-    loop {
+    let (fit, halves, light) = loop {
         let samples = options.samples[round.min(options.samples.len() - 1)];
         // Two independent halves, whose difference is the noise. The same paths in every round, so that a change is
         // none of noise.
@@ -143,41 +141,34 @@ fn run(room: &PartRoom, options: &DelightOptions, progress: Progress<'_>) -> Res
             })
         };
         let halves = [half(0)?, half(1)?];
-        let fit = fit(room, &halves, &options.fit);
-        let weights = weights(&fit);
+        let (photo, valid, parts) = (&room.photo, &room.valid, &room.parts);
+        let target = JointTarget { photo, valid, parts, light: &halves, shown: &room.shown };
+        let fit = fit_jointly(&options.fit, &target);
+        // The weights of a basis: the radiances, and 1 for what the photo lights.
+        let weights: Vec<[f64; 3]> = fit.radiances.iter().copied().chain([[1.0; 3]]).collect();
         let halves = weighted(&halves, &weights)?;
         let light = fitted_light(room, &halves);
         let found = part_colors(room, &light.base_color);
-        let change = largest_change(&surfaces.colors, &found);
+        let changes = surfaces.colors.iter().flatten().zip(found.iter().flatten()).map(|(a, b)| (a - b).abs());
+        let change = changes.fold(0.0, f32::max);
         surfaces.colors = found;
         round += 1;
         if round < options.samples.len() {
             surfaces.roughnesses = choose_roughness(room, &cache, &surfaces, &weights, options.seed, progress)?;
         }
-        let is_last = (round >= options.samples.len() && change <= SETTLED) || round >= options.most_rounds;
-        if is_last {
-            let errors = standard_errors(room, &halves, &light);
-            let mirrors = find_mirrors(room, &cache);
-            return Ok(finished(room, &fit, light, &errors, &surfaces, &mirrors, round));
+        if (round >= options.samples.len() && change <= SETTLED) || round >= options.most_rounds {
+            break (fit, halves, light);
         }
-    }
-}
-
-/// The pictures of the last round.
-fn finished(
-    room: &PartRoom,
-    fit: &JointFit,
-    light: RoundLight,
-    errors: &Picture<f32>,
-    surfaces: &Surfaces,
-    mirrors: &BTreeMap<u16, Mirror>,
-    rounds: usize,
-) -> DelitPhoto {
-    let base_color = towards_parts(room, &light.base_color, &surfaces.colors, errors);
+    };
+    // The pictures of the last round.
+    let errors = standard_errors(room, &halves, &light);
+    let mirrors = find_mirrors(room, &cache);
+    let base_color = towards_parts(room, &light.base_color, &surfaces.colors, &errors);
     let part = |x: usize, y: usize| room.valid.get(x, y).then(|| room.parts.get(x, y));
     let mirror = |x: usize, y: usize| part(x, y).and_then(|part| mirrors.get(&part));
     let (width, height) = (room.photo.width(), room.photo.height());
-    DelitPhoto {
+    let lights = room.lights.iter().zip(&fit.radiances);
+    Ok(DelitPhoto {
         base_color: Picture::from_fn(width, height, |x, y| {
             mirror(x, y).map_or(base_color.get(x, y), |mirror| LinearRgb(mirror.base_color))
         }),
@@ -191,30 +182,9 @@ fn finished(
         shading: light.diffuse,
         gloss: light.gloss,
         confidence: errors.map(|error| 1.0 / (1.0 + (error / DOUBTFUL_ERROR).powi(2))),
-        lights: room
-            .lights
-            .iter()
-            .zip(&fit.radiances)
-            .map(|(light, radiance)| FittedLight { light: light.clone(), radiance: *radiance })
-            .collect(),
-        rounds,
-    }
-}
-
-fn fit(room: &PartRoom, halves: &[SplitLight; 2], rules: &JointFitRules) -> JointFit {
-    let target =
-        JointTarget { photo: &room.photo, valid: &room.valid, parts: &room.parts, light: halves, shown: &room.shown };
-    fit_jointly(rules, &target)
-}
-
-/// The weights of a basis: the radiances, and 1 for what the photo lights.
-fn weights(fit: &JointFit) -> Vec<[f64; 3]> {
-    fit.radiances.iter().copied().chain([[1.0; 3]]).collect()
-}
-
-fn largest_change(before: &[[f32; 3]], after: &[[f32; 3]]) -> f32 {
-    let changes = before.iter().flatten().zip(after.iter().flatten()).map(|(a, b)| (a - b).abs());
-    changes.fold(0.0, f32::max)
+        lights: lights.map(|(light, radiance)| FittedLight { light: light.clone(), radiance: *radiance }).collect(),
+        rounds: round,
+    })
 }
 
 /// The least shading, as a share of the photo's mean, that the photo is divided by.

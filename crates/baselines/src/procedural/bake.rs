@@ -33,41 +33,27 @@ pub(super) fn bake_all(
     keep_seen: bool,
     mut each: impl FnMut(usize, Baked) -> Result<(), BaselineError>,
 ) -> Result<(), BaselineError> {
+    let (residuals, given) = (materials.residuals.as_deref(), materials.given);
+    let baker = Baker { of_part: &materials.of_part, residuals, given };
     for (at, instance) in geometry.scene.instances.iter().enumerate() {
-        if let Some(atlas) = &instance.atlas {
-            let known = match keep_seen {
-                true => lift(geometry, seen, estimate, at, atlas.size as usize),
-                false => unknown(geometry.mesh(at), atlas.size as usize),
-            };
-            each(at, bake(materials, geometry, known, keep_seen, at))?;
-        }
+        let Some(atlas) = &instance.atlas else { continue };
+        let mut known = match keep_seen {
+            true => lift(geometry, seen, estimate, at, atlas.size as usize),
+            false => unknown(geometry.mesh(at), atlas.size as usize),
+        };
+        let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
+        known.texels = known.texels.map(|texel| match texel {
+            Texel::Seen(values) => Texel::Seen(completed(values, given)),
+            other => other,
+        });
+        baker.fill_unseen(geometry.mesh(at), materials.triangles.of(at), &mut known);
+        // A graph has a roughness and a metallic of its own.
+        let has_graph = materials.has_graph(at);
+        let roughness = given.roughness || has_graph;
+        let maps = GivenMaps { base_color: true, roughness, metallic: given.metallic || has_graph };
+        each(at, Baked { maps: Maps::of_atlas(&known, maps), seen })?;
     }
     Ok(())
-}
-
-fn bake(
-    materials: &SceneMaterials<'_>,
-    geometry: &SceneGeometry<'_>,
-    mut known: PartialAtlas,
-    keep_seen: bool,
-    instance: usize,
-) -> Baked {
-    let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
-    known.texels = known.texels.map(|texel| match texel {
-        Texel::Seen(values) => Texel::Seen(completed(values, materials.given)),
-        other => other,
-    });
-    let residuals = materials.residuals.as_deref();
-    let baker = Baker { of_part: &materials.of_part, residuals, given: materials.given };
-    baker.fill_unseen(geometry.mesh(instance), materials.triangles.of(instance), &mut known);
-    // A graph has a roughness and a metallic of its own.
-    let has_graph = materials.has_graph(instance);
-    let given = GivenMaps {
-        base_color: true,
-        roughness: materials.given.roughness || has_graph,
-        metallic: materials.given.metallic || has_graph,
-    };
-    Baked { maps: Maps::of_atlas(&known, given), seen }
 }
 
 /// An atlas of which nothing is known.
