@@ -34,12 +34,12 @@ use crate::submission::{Method, check_new_place};
 use crate::{nn, submission};
 
 /// An object's id: the scene's id and the instance's index, such as `living-00012`.
-pub fn object_id(scene: &SceneId, instance: &Instance) -> String {
+fn object_id(scene: &SceneId, instance: &Instance) -> String {
     format!("{scene}-{:05}", instance.index.0)
 }
 
 /// A mesh as OBJ, in world space; the faces are in the order of its triangles.
-pub fn obj_text(mesh: &TriangleMesh) -> String {
+fn obj_text(mesh: &TriangleMesh) -> String {
     let mut text = String::new();
     let mut line = |words: std::fmt::Arguments<'_>| {
         text.write_fmt(words).expect("writing to a String cannot fail");
@@ -58,7 +58,7 @@ pub fn obj_text(mesh: &TriangleMesh) -> String {
 }
 
 /// Width and height of TEXGen's textures, in texels.
-pub const TEXELS: usize = 1024;
+const TEXELS: usize = 1024;
 
 /// The object's folder, relative to the root.
 fn object_folder(id: &str) -> String {
@@ -220,7 +220,7 @@ pub fn import_texgen(
     Ok(Imported { instances, textured })
 }
 
-fn file(results: &Path, id: &str) -> std::path::PathBuf {
+fn file(results: &Path, id: &str) -> PathBuf {
     results.join(format!("{id}.png"))
 }
 

@@ -1,52 +1,10 @@
 //! The noises of MaterialX' standard library, which are those of Open Shading Language, with their derivatives.
 //!
-//! All of them hash the whole numbers of a lattice's cells. [`cell`] is constant in each cell. [`perlin`] is Perlin's
+//! All of them hash the whole numbers of a lattice's cells, by Bob Jenkins' `lookup3` (burtleburtle.net/bob/c/lookup3.c,
+//! public domain), as Open Shading Language seeds it. [`cell`] is constant in each cell. [`perlin`] is Perlin's
 //! improved gradient noise in two dimensions (Perlin 2002, "Improving noise"), with OSL's gradients and scale, of which
 //! [`fractal`] sums octaves. [`distance`] and [`nearest_cell`] are Worley's cellular noise in two dimensions (Worley
 //! 1996, "A cellular texture basis function"): each cell has one random point.
-
-/// The state that `lookup3` begins with: `0xdeadbeef`, four bytes a word, and OSL's 13.
-fn seed(words: u32) -> u32 {
-    0xdead_beef_u32.wrapping_add(4 * words).wrapping_add(13)
-}
-
-/// The last step of `lookup3`.
-fn finish(mut a: u32, mut b: u32, mut c: u32) -> u32 {
-    let step = |target: u32, by: u32, turn: u32| (target ^ by).wrapping_sub(by.rotate_left(turn));
-    c = step(c, b, 14);
-    a = step(a, c, 11);
-    b = step(b, a, 25);
-    c = step(c, b, 16);
-    a = step(a, c, 4);
-    b = step(b, a, 14);
-    step(c, b, 24)
-}
-
-/// The hash of two whole numbers.
-fn hash2(x: i32, y: i32) -> u32 {
-    let start = seed(2);
-    finish(start.wrapping_add(x.cast_unsigned()), start.wrapping_add(y.cast_unsigned()), start)
-}
-
-/// The hash of three whole numbers.
-fn hash3(x: i32, y: i32, z: i32) -> u32 {
-    let start = seed(3);
-    let add = |word: i32| start.wrapping_add(word.cast_unsigned());
-    finish(add(x), add(y), add(z))
-}
-
-/// A hash as a number from 0 to 1.
-fn to_unit(hash: u32) -> f64 {
-    f64::from(hash) / f64::from(u32::MAX)
-}
-
-/// The lattice cell that holds a coordinate, and the place within it. Beyond the range of whole numbers cells repeat.
-fn cell_of(x: f64) -> (i32, f64) {
-    let floor = x.floor();
-    #[allow(clippy::cast_possible_truncation, reason = "cells repeat beyond the range")]
-    let cell = floor as i64 as i32;
-    (cell, x - floor)
-}
 
 /// A number from 0 to 1 that is constant in each cell.
 pub fn cell(x: f64, y: f64) -> f64 {
@@ -194,6 +152,49 @@ pub fn nearest_cell(x: f64, y: f64, jitter: f64, channel: Channel) -> f64 {
         Channel::Scalar => cell(x + dx, y + dy),
         Channel::Component(at) => cell_component(x + dx, y + dy, i32::from(at)),
     }
+}
+
+/// The state that `lookup3` begins with: `0xdeadbeef`, four bytes a word, and OSL's 13.
+fn seed(words: u32) -> u32 {
+    0xdead_beef_u32.wrapping_add(4 * words).wrapping_add(13)
+}
+
+/// The last step of `lookup3`.
+fn finish(mut a: u32, mut b: u32, mut c: u32) -> u32 {
+    let step = |target: u32, by: u32, turn: u32| (target ^ by).wrapping_sub(by.rotate_left(turn));
+    c = step(c, b, 14);
+    a = step(a, c, 11);
+    b = step(b, a, 25);
+    c = step(c, b, 16);
+    a = step(a, c, 4);
+    b = step(b, a, 14);
+    step(c, b, 24)
+}
+
+/// The hash of two whole numbers.
+fn hash2(x: i32, y: i32) -> u32 {
+    let start = seed(2);
+    finish(start.wrapping_add(x.cast_unsigned()), start.wrapping_add(y.cast_unsigned()), start)
+}
+
+/// The hash of three whole numbers.
+fn hash3(x: i32, y: i32, z: i32) -> u32 {
+    let start = seed(3);
+    let add = |word: i32| start.wrapping_add(word.cast_unsigned());
+    finish(add(x), add(y), add(z))
+}
+
+/// A hash as a number from 0 to 1.
+fn to_unit(hash: u32) -> f64 {
+    f64::from(hash) / f64::from(u32::MAX)
+}
+
+/// The lattice cell that holds a coordinate, and the place within it. Beyond the range of whole numbers cells repeat.
+fn cell_of(x: f64) -> (i32, f64) {
+    let floor = x.floor();
+    #[allow(clippy::cast_possible_truncation, reason = "cells repeat beyond the range")]
+    let cell = floor as i64 as i32;
+    (cell, x - floor)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! A graph with the settings that a fit gave it: what a fit returns and what textures are made of. Beside it, what is
 //! known before anything is seen: how usual the sizes of a graph are (in metres, a plank and a strip of parquet differ,
-//! and so do leather and roughcast), and which graphs are likely on which things.
+//! and so do leather and roughcast), and which graphs are likely on which things: weak odds, so that what is seen
+//! decides.
 
 use std::sync::Arc;
 

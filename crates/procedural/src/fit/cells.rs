@@ -205,12 +205,7 @@ struct InRow {
 
 /// The number of each point's board, and the price of having chosen where the rows begin: the logarithm of the number
 /// of ways. `sizes` are the slots of the width and the length of a board.
-pub(super) fn boards(
-    model: &Model,
-    settings: &Settings,
-    [width, length]: [usize; 2],
-    points: &[Point],
-) -> (Vec<i64>, f64) {
+fn boards(model: &Model, settings: &Settings, [width, length]: [usize; 2], points: &[Point]) -> (Vec<i64>, f64) {
     let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
     let (sin, cos) = libm::sincos(number("theta").to_radians());
     let (t_u, t_v) = (number("t_u"), number("t_v"));

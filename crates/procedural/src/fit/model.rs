@@ -73,7 +73,7 @@ pub fn role(graph: &Graph, parameter: usize) -> Role {
 }
 
 /// Whether a parameter is a length: graphs state units in the parameter's `doc`, the only place for them.
-pub(crate) fn is_length(graph: &Graph, parameter: usize) -> bool {
+pub(super) fn is_length(graph: &Graph, parameter: usize) -> bool {
     graph.parameters[parameter].doc.as_ref().is_some_and(|doc| doc.contains("in metres"))
 }
 

@@ -1,4 +1,4 @@
-//! The XML as a tree of plain elements, with its size and depth checked.
+//! The XML as a tree of plain elements, and the limits on this untrusted input, which are checked before memory is taken.
 
 use crate::error::{Code, Findings};
 use crate::value::shortened;
@@ -38,7 +38,7 @@ impl Default for Limits {
 }
 
 /// The greatest number of octaves of a fractal, since each costs as much as a noise.
-pub const MOST_OCTAVES: i32 = 16;
+pub(super) const MOST_OCTAVES: i32 = 16;
 
 #[derive(Debug)]
 pub(super) struct Element {
