@@ -12,13 +12,11 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 use mateval_baselines::estimate_source::EstimateSource;
-use mateval_baselines::fill::fill;
-use mateval_baselines::geometry::SceneGeometry;
+use mateval_baselines::fill::{FillRule, SeenCloud, fill};
+use mateval_baselines::geometry::{SceneGeometry, SeenPoint};
 use mateval_baselines::lift::{PartialAtlas, Texel, lift, place_of};
 use mateval_baselines::maps::Maps;
 use mateval_baselines::nn::{self, NnOptions, seen_pixels};
-use mateval_baselines::seen::SeenPoint;
-use mateval_baselines::seen_cloud::{FillRule, SeenCloud};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 

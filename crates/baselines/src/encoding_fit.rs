@@ -51,7 +51,6 @@ pub struct Sample {
     pub stored: f64,
     /// Index of the group whose factor is free.
     pub group: usize,
-    /// Index of the instance.
     pub instance: usize,
 }
 
@@ -103,12 +102,10 @@ pub enum Verdict {
 /// The result of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodingFit {
-    /// What the numbers show.
     pub verdict: Verdict,
     /// The encodings that they fit, the best first: all of them if even the best explains little; empty unless the verdict
     /// is `Fits` or `Undecided`.
     pub fits: Vec<FittedEncoding>,
-    /// All encodings.
     pub candidates: Vec<Candidate>,
     /// Number of instances with enough samples.
     pub instances: usize,

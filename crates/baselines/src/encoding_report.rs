@@ -15,12 +15,11 @@ use mateval_scene::{Progress, Report};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::adapted_file::{AdaptedFile, Channel};
-use crate::adapter::Adapter;
+use crate::adapter::{AdaptedFile, Adapter, Channel};
 use crate::encoding_fit::{Candidate, EncodingFit, FittedEncoding, Sample, Verdict, fit};
 use crate::error::BaselineError;
+use crate::estimate::Placement;
 use crate::geometry::input_view;
-use crate::placement::Placement;
 
 /// The value of `format` for this version of the report.
 pub const ENCODING_FORMAT: &str = "mateval-encoding/1";

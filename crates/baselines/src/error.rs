@@ -9,14 +9,11 @@ use crate::import::error::ImportError;
 /// Why a baseline could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BaselineError {
-    /// A file operation failed.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
         /// The operation, such as `read` or `write`.
         action: &'static str,
-        /// The file.
         path: PathBuf,
-        /// The operating system's error.
         source: std::io::Error,
     },
     /// The output exists and is never replaced.
@@ -34,7 +31,6 @@ pub enum BaselineError {
     /// A folder of graphs holds none, or too many.
     #[error("'{}' holds {found} .mtlx files; expected 1 to {most}", folder.display())]
     GraphCount {
-        /// The folder.
         folder: PathBuf,
         /// The number of its `.mtlx` files.
         found: usize,
@@ -43,12 +39,7 @@ pub enum BaselineError {
     },
     /// Two graphs have one name.
     #[error("'{}' has the graph '{name}', which is built in or in another file of its folder; give it another name", path.display())]
-    SameGraph {
-        /// The file.
-        path: PathBuf,
-        /// The graph's name.
-        name: String,
-    },
+    SameGraph { path: PathBuf, name: String },
     /// How much randomness is kept is no share.
     #[error("the detail is {0}; expected 0 to 1")]
     Detail(f64),
@@ -94,12 +85,7 @@ pub enum BaselineError {
     },
     /// An adapter cannot be used.
     #[error("adapter '{}': {source}", path.display())]
-    BadAdapter {
-        /// Its file or name.
-        path: PathBuf,
-        /// What is wrong.
-        source: AdapterError,
-    },
+    BadAdapter { path: PathBuf, source: AdapterError },
     /// None of the files that an adapter lists exists.
     #[error("no estimate: expected {}; fix the adapter's `files`, or run the method", list(paths))]
     NoEstimate {
@@ -120,16 +106,10 @@ pub enum BaselineError {
     EmptyEstimate(String),
     /// A pixel is infinite or NaN after decoding.
     #[error("'{}': pixel {pixel:?} is not finite after decoding; fix the adapter's `encoding` or `range`, or the picture", path.display())]
-    NotFinite {
-        /// The picture.
-        path: PathBuf,
-        /// Column and row.
-        pixel: (usize, usize),
-    },
+    NotFinite { path: PathBuf, pixel: (usize, usize) },
     /// A value is far above what a material can have.
     #[error("'{}' holds {value} after decoding; expected linear values up to {largest}; if the numbers run from 0 to 255, write range = [0, 255] below the map in the adapter", path.display())]
     TooLarge {
-        /// The picture.
         path: PathBuf,
         /// The first such value, linear.
         value: f32,
@@ -139,7 +119,6 @@ pub enum BaselineError {
     /// Many values are above what a material can have.
     #[error("'{}' holds values up to {value} after decoding, and {:.0} % of its pixels are above {bright}; expected linear values from 0 to 1; write range = [0, MAX] below the map in the adapter, where MAX is the stored number that stands for 1, or scale = \"free\" if nobody knows it", path.display(), 100.0 * share)]
     ManyTooLarge {
-        /// The picture.
         path: PathBuf,
         /// The largest value, linear.
         value: f32,
@@ -151,7 +130,6 @@ pub enum BaselineError {
     /// Numbers of bytes, saved as 16-bit integers.
     #[error("'{}' holds 16-bit integers that reach only {largest} of 65535; expected 65535 for 1; save them as 8-bit integers, or write range = [0.0, {high}] (255 of 65535) below the map in the adapter", path.display())]
     BytesInWords {
-        /// The picture.
         path: PathBuf,
         /// The largest number.
         largest: u8,
@@ -161,9 +139,7 @@ pub enum BaselineError {
     /// Many values are far below 0.
     #[error("'{}' holds {value}, and {:.0} % of its pixels are below 0, in the adapter's `range`; expected 0 to 1; if the numbers run from -1 to 1, write range = [-1.0, 1.0] below the map in the adapter", path.display(), 100.0 * share)]
     TooSmall {
-        /// The picture.
         path: PathBuf,
-        /// The smallest value.
         value: f32,
         /// The share of such pixels.
         share: f64,
@@ -171,7 +147,6 @@ pub enum BaselineError {
     /// An estimate has other proportions than the input view.
     #[error("the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions, within 5 %; {}", size.0, size.1, view.0, view.1, proportions_advice(*adapted))]
     Proportions {
-        /// The scene's id.
         scene: String,
         /// Width and height of the estimate.
         size: (usize, usize),
@@ -186,9 +161,7 @@ pub enum BaselineError {
     /// The pictures of one estimate differ in size.
     #[error("the estimate of scene '{scene}' in '{}' has pictures of {}x{} and of {}x{} pixels; expected one size", folder.display(), sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
     Sizes {
-        /// The folder.
         folder: PathBuf,
-        /// The scene's id.
         scene: String,
         /// Width and height of two of them.
         sizes: [(usize, usize); 2],
@@ -206,29 +179,18 @@ pub enum BaselineError {
     },
     /// Labels that cannot be used for their instance.
     #[error("'{}': {source}; export the instances again and run PartField on them", path.display())]
-    BadLabels {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: LabelsError,
-    },
+    BadLabels { path: PathBuf, source: LabelsError },
     /// A folder without a file for any scene.
     #[error("'{}' holds no file for any scene of the dataset; expected <scene>/<instance>.glb, <scene>.glb (or .gltf, .obj) or <scene>.json", .0.display())]
     NothingToImport(PathBuf),
     /// A file cannot be imported.
     #[error("'{}': {source}", path.display())]
-    BadImport {
-        /// The file.
-        path: PathBuf,
-        /// Why it was refused.
-        source: ImportError,
-    },
+    BadImport { path: PathBuf, source: ImportError },
     /// A scene's files describe none of its instances.
     #[error("'{}': the files for scene '{scene}' hold no triangles and name no part or instance; expected meshes, or the ids of scene.json", folder.display())]
     NothingNamed {
         /// The folder of imported files.
         folder: PathBuf,
-        /// The scene's id.
         scene: String,
     },
     /// A scene's meshes lie too far from all its instances.
@@ -236,7 +198,6 @@ pub enum BaselineError {
     NothingNear {
         /// The folder of imported files.
         folder: PathBuf,
-        /// The scene's id.
         scene: String,
         /// Smallest distance between a mesh and an instance, in metres.
         nearest_m: f64,
@@ -274,7 +235,6 @@ fn best(residual_m: Option<f64>) -> String {
     }
 }
 
-/// One line for each fault.
 fn lines(faults: &[ProceduralError]) -> String {
     faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
@@ -289,13 +249,10 @@ pub enum AdapterError {
     /// The file is not TOML, or its keys are wrong.
     #[error(transparent)]
     Toml(#[from] toml::de::Error),
-    /// No map is described.
     #[error("it names no file; expected base_color, roughness or metallic")]
     NoMap,
-    /// `base_color` has a channel.
     #[error("base_color has a `channel`; only roughness and metallic may have one")]
     ColorChannel,
-    /// A map without paths.
     #[error("`files` is empty; expected at least one path")]
     NoFiles,
     /// A range that is empty, reversed or not finite.
@@ -311,12 +268,5 @@ pub enum LabelsError {
     Unreadable(#[from] std::io::Error),
     /// The number of labels differs from the number of triangles.
     #[error("{labels} labels; '{instance}' has {triangles} triangles")]
-    Count {
-        /// Labels in the file.
-        labels: u64,
-        /// The instance's id.
-        instance: String,
-        /// The instance's triangles.
-        triangles: usize,
-    },
+    Count { labels: u64, instance: String, triangles: usize },
 }

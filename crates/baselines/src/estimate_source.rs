@@ -15,9 +15,8 @@ use mateval_scene::submission::Map;
 use crate::adapter::Adapter;
 use crate::delight::{CandidateLights, DelightOptions, delight};
 use crate::error::BaselineError;
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, Placement};
 use crate::geometry::{SceneGeometry, input_view};
-use crate::placement::Placement;
 
 /// The most files that are named as not read.
 const MOST_NAMED: usize = 5;
@@ -31,7 +30,6 @@ pub enum EstimateSource {
     Input,
     /// The input picture without its light, as [`crate::delight`] finds it with these lights.
     Delight(CandidateLights),
-    /// A method's pictures.
     Files {
         /// The folder that the adapter's paths are relative to.
         folder: PathBuf,

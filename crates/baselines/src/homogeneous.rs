@@ -1,4 +1,5 @@
-//! One colour per instance or per part: the median of an estimate inside its mask.
+//! One colour per instance or per part: the median of an estimate inside its mask; and `grey`, the floor: one colour for
+//! every surface.
 //!
 //! IM2CAD (Izadinia et al., CVPR 2017) colours furniture in this way, per instance; procedural methods fall back to it
 //! per part.
@@ -6,19 +7,31 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::{Picture, png_io};
 use mateval_scene::open::Dataset;
+use mateval_scene::submission::{GREY, MAP_SIZES, Map};
 use mateval_scene::{PartSetId, Progress};
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
 use crate::estimate_source::EstimateSource;
-use crate::geometry::SceneGeometry;
-use crate::maps::Maps;
-use crate::median::{Medians, median};
+use crate::geometry::{PartTriangles, SceneGeometry};
+use crate::maps::{Maps, Medians, PartColors, median};
 use crate::nn::seen_pixels;
-use crate::part_colors::PartColors;
-use crate::part_triangles::PartTriangles;
 use crate::submission::{self, Method};
+
+/// Writes base colour 0.5 (linear) for every instance and returns their number. Roughness and metallic have no files, so
+/// that the format's defaults hold.
+pub fn write_grey(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
+    let texel = [byte_from_unit(srgb_from_linear(GREY)); 3];
+    let size = *MAP_SIZES.start();
+    let method = Method::new("grey", "base colour 0.5 (linear) everywhere, roughness 0.5, metallic 0");
+    submission::write(dataset, out, force, &method, &|_| (), |_, _, folder| {
+        let path = folder.join(Map::BaseColor.stem()).with_extension("png");
+        Ok(png_io::write_rgb_bytes(&path, &Picture::filled(size, size, texel))?)
+    })
+}
 
 const UNSEEN: &str = "what is not seen takes the median of its category in the picture, else base colour 0.5 (linear)";
 

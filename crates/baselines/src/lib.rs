@@ -3,16 +3,16 @@
 //! Input: a dataset, and for most baselines an [`estimate`] of the input view, which may come from another method's
 //! pictures by way of an [`adapter`]. Output: a submission.
 //!
-//! Baselines: [`truth`] copies the baked ground truth, the ceiling for atlases of this size; [`grey`] is the floor;
-//! [`nn`] lifts the estimate to the atlases; [`homogeneous`] takes medians of it; [`import`] transfers meshes that have
-//! their own uv. Bridges: with [`texgen`] another project's network fills unseen texels, with [`partfield`] one splits
-//! instances into parts.
+//! Baselines: [`submission::write_truth`] copies the baked ground truth, the ceiling for atlases of this size;
+//! [`homogeneous::write_grey`] is the floor; [`nn`] lifts the estimate to the atlases; [`homogeneous`] takes medians of
+//! it; [`import`] transfers meshes that have their own uv. [`bridges`]: with TEXGen another project's network fills
+//! unseen texels, with PartField one splits instances into parts.
 //!
-//! Steps: [`geometry`] reads the scene as methods see it; [`seen`] determines which instance each pixel shows; [`lift`]
-//! writes the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.
+//! Steps: [`geometry`] reads the scene as methods see it and determines which instance each pixel shows; [`lift`] writes
+//! the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.
 
-pub mod adapted_file;
 pub mod adapter;
+pub mod bridges;
 pub mod delight;
 pub mod encoding_fit;
 pub mod encoding_report;
@@ -21,25 +21,39 @@ pub mod estimate;
 pub mod estimate_source;
 pub mod fill;
 pub mod geometry;
-pub mod grey;
 pub mod homogeneous;
 pub mod import;
 pub mod lift;
 pub mod maps;
-pub mod median;
 pub mod nn;
-pub mod objects;
 mod page_shell;
-pub mod part_colors;
-pub mod part_triangles;
-pub mod partfield;
-pub mod placement;
 pub mod procedural;
-pub mod scale;
-pub mod seen;
-pub mod seen_cloud;
 pub mod submission;
-pub mod texgen;
-pub mod truth;
 
 pub use error::BaselineError;
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod grey {
+    pub use crate::homogeneous::write_grey as write;
+}
+#[doc(hidden)]
+pub mod partfield {
+    pub use crate::bridges::{export_partfield as export, import_partfield as import};
+}
+#[doc(hidden)]
+pub mod seen {
+    pub use crate::geometry::SeenPixels;
+}
+#[doc(hidden)]
+pub mod seen_cloud {
+    pub use crate::fill::FillRule;
+}
+#[doc(hidden)]
+pub mod texgen {
+    pub use crate::bridges::{export_texgen as export, import_texgen as import};
+}
+#[doc(hidden)]
+pub mod truth {
+    pub use crate::submission::write_truth as write;
+}

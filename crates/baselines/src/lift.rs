@@ -9,8 +9,7 @@ use mateval_tracer::Ray;
 use rayon::prelude::*;
 
 use crate::estimate::{Estimate, Values};
-use crate::geometry::SceneGeometry;
-use crate::seen::SeenPixels;
+use crate::geometry::{SceneGeometry, SeenPixels};
 
 /// Largest number of places along a texel's side; a texel that covers more pixels is undersampled.
 const MAX_PLACES: f64 = 16.0;
@@ -33,7 +32,6 @@ pub enum Texel {
 pub struct PartialAtlas {
     /// The triangle that each texel belongs to.
     pub atlas: UvAtlas,
-    /// The texels.
     pub texels: Picture<Texel>,
 }
 
@@ -50,7 +48,7 @@ pub struct PartialAtlas {
 /// use mateval_baselines::estimate::Estimate;
 /// use mateval_baselines::geometry::SceneGeometry;
 /// use mateval_baselines::lift::{Texel, lift};
-/// use mateval_baselines::seen::SeenPixels;
+/// use mateval_baselines::geometry::SeenPixels;
 /// use mateval_image::{LinearRgb, Picture};
 /// use mateval_scene::layout::SceneFolder;
 /// use mateval_scene::material::{ColorInput, Material, MaterialModel};

@@ -14,13 +14,10 @@ use rayon::prelude::*;
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
 use crate::estimate_source::EstimateSource;
-use crate::fill::fill;
-use crate::geometry::SceneGeometry;
+use crate::fill::{FillRule, SeenCloud, fill};
+use crate::geometry::{SceneGeometry, SeenPixels, SeenPoint};
 use crate::lift::{PartialAtlas, Texel, lift};
-use crate::maps::Maps;
-use crate::median::Medians;
-use crate::seen::{SeenPixels, SeenPoint};
-use crate::seen_cloud::{FillRule, SeenCloud};
+use crate::maps::{Maps, Medians};
 use crate::submission::{self, Method};
 
 /// How unseen texels are filled.

@@ -1,4 +1,5 @@
-//! Writes a submission, complete or not at all.
+//! Writes a submission, complete or not at all; and `gt`, the ceiling: the ground truth baked to the atlases, as a
+//! submission.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +17,6 @@ use crate::error::BaselineError;
 /// Name and description of a baseline in `submission.json`.
 #[derive(Clone, Debug)]
 pub struct Method {
-    /// Name in tables.
     pub name: String,
     /// All choices that were made.
     pub description: String,
@@ -118,4 +118,23 @@ fn check_place(out: &Path, force: bool) -> Result<(), BaselineError> {
         return Err(BaselineError::NotASubmission(out.to_owned()));
     }
     Ok(())
+}
+
+/// Copies the baked maps of every instance and returns the number of instances.
+pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
+    // A public tree is refused before anything is written.
+    for scene in dataset.scenes.iter().filter(|scene| !dataset.folder(&scene.id).truth().exists()) {
+        dataset.check_files(&scene.id, |path| path.starts_with("ground_truth/materials/"))?;
+    }
+    let method = Method::new("gt", "the true materials baked to the dataset's own atlases");
+    write(dataset, out, force, &method, &|_| (), |scene, instance, folder| {
+        let truth = dataset.folder(&scene.id).truth_material(&instance.id);
+        for map in Map::ALL {
+            let name = Path::new(map.stem()).with_extension("png");
+            let (from, to) = (truth.join(&name), folder.join(&name));
+            let copied = std::fs::copy(&from, &to);
+            copied.map_err(|source| BaselineError::Io { action: "copy", path: from, source })?;
+        }
+        Ok(())
+    })
 }

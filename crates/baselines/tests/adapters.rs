@@ -10,8 +10,7 @@ use std::path::Path;
 
 use glam::DVec2;
 use mateval_baselines::adapter::Adapter;
-use mateval_baselines::estimate::Estimate;
-use mateval_baselines::placement::{Placement, Region};
+use mateval_baselines::estimate::{Estimate, Placement, Region};
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture};

@@ -22,8 +22,7 @@ use std::collections::BTreeMap;
 
 use cpu_time::ThreadTime;
 use mateval_procedural::fit::choose::Fitter;
-use planting::draw::{Draw, LENGTHS, Lengths, draw};
-use planting::outcome::{Outcome, outcome, outcome_as_paper, outcome_of_category};
+use planting::{Draw, LENGTHS, Lengths, Outcome, draw, outcome, outcome_as_paper, outcome_of_category};
 use rayon::prelude::*;
 
 fn main() {

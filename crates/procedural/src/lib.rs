@@ -14,25 +14,37 @@
 //! input called `footprint` is set at every point to the extent of its pixel or texel, so that edges and lines are as
 //! blurred as the pixel needs.
 
-mod batch;
-mod error;
-pub mod finding;
+pub mod error;
+pub mod evaluator;
 pub mod fit;
 pub mod graph;
-mod kernel;
-pub mod lanes;
 pub mod library;
-pub mod limits;
 pub mod mtlx;
 pub mod node;
 pub mod noise;
-pub mod picture;
 pub mod program;
-pub mod settings;
 pub mod value;
 
-pub use batch::Evaluator;
 pub use error::ProceduralError;
-pub use graph::Graph;
-pub use program::compile::Program;
-pub use settings::Settings;
+pub use evaluator::Evaluator;
+pub use graph::{Graph, Settings};
+pub use program::Program;
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod finding {
+    pub use crate::error::Finding;
+}
+#[doc(hidden)]
+pub mod lanes {
+    pub use crate::evaluator::Points;
+    pub use crate::program::op::LANES;
+}
+#[doc(hidden)]
+pub mod limits {
+    pub use crate::mtlx::Limits;
+}
+#[doc(hidden)]
+pub mod picture {
+    pub use crate::evaluator::{Pixel, Square, render};
+}

@@ -2,8 +2,7 @@
 
 use crate::error::ProceduralError;
 use crate::graph::Graph;
-use crate::limits::Limits;
-use crate::mtlx::read_text;
+use crate::mtlx::{Limits, read_text};
 
 /// What kind of pattern a graph makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,14 +38,10 @@ impl serde::Serialize for Class {
     }
 }
 
-/// A built-in graph.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// The name.
     pub name: &'static str,
-    /// The kind of pattern.
     pub class: Class,
-    /// The `.mtlx` file.
     pub text: &'static str,
 }
 
@@ -60,7 +55,6 @@ macro_rules! entries {
     };
 }
 
-/// All built-in graphs.
 pub const LIBRARY: [Entry; 28] = entries![
     Flat "paint",
     Isotropic "plaster",
@@ -92,7 +86,6 @@ pub const LIBRARY: [Entry; 28] = entries![
     Oriented "metal",
 ];
 
-/// The entry of this name.
 pub fn entry(name: &str) -> Option<&'static Entry> {
     LIBRARY.iter().find(|entry| entry.name == name)
 }

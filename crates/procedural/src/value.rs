@@ -16,7 +16,6 @@ pub enum Type {
 }
 
 impl Type {
-    /// All types.
     pub const ALL: [Self; 5] = [Self::Float, Self::Integer, Self::Vector2, Self::Vector3, Self::Color3];
 
     /// The name in `.mtlx` files.
@@ -35,7 +34,6 @@ impl Type {
         Self::ALL.into_iter().find(|kind| kind.word() == word)
     }
 
-    /// The number of components.
     pub fn width(self) -> usize {
         match self {
             Self::Float | Self::Integer => 1,
@@ -51,7 +49,6 @@ pub enum ValueError {
     /// Another number of components.
     #[error("expected {expected} numbers separated by commas, found {found}")]
     Count {
-        /// The type's width.
         expected: usize,
         /// The number of components found.
         found: usize,
@@ -111,12 +108,10 @@ impl Value {
         Ok(Self { kind, numbers })
     }
 
-    /// The type.
     pub fn kind(&self) -> Type {
         self.kind
     }
 
-    /// The components.
     pub fn numbers(&self) -> &[f64] {
         &self.numbers[..self.kind.width()]
     }
@@ -157,8 +152,9 @@ pub(crate) fn shortened(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use proptest::prelude::*;
+
+    use super::*;
 
     #[test]
     fn only_finite_numbers_of_the_right_count_are_values() {

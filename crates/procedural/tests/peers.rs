@@ -7,11 +7,7 @@
 #![allow(clippy::print_stderr, reason = "measurements are printed")]
 
 mod peers {
-    mod cases;
-    mod definitions;
     mod graphs;
     mod nodes;
     mod osl;
-    mod python;
-    mod validation;
 }

@@ -9,14 +9,8 @@
 mod planting;
 
 mod suite {
-    mod derivatives;
-    mod files;
-    mod footprint;
     mod graphs;
     mod hostile;
     mod library;
-    mod nodes;
-    mod pictures;
     mod planted;
-    mod settings;
 }

@@ -1,5 +1,6 @@
-//! The files of `mateval baseline delight`.
+//! The files of `mateval baseline delight`: pictures, `lights.json`, and a page with what was found in each photo.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
@@ -8,15 +9,34 @@ use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{Progress, Report, SceneError, json};
+use serde::{Deserialize, Serialize};
 
-use super::delit_photo::DelitPhoto;
-use super::lights_file::{LIGHTS_FORMAT, LightsFile};
-use super::options::DelightOptions;
-use super::page;
-use super::rounds::delight;
+use super::room::FittedLight;
+use super::{CandidateLights, DelightOptions, DelitPhoto, delight};
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
+use crate::page_shell::{figure, page};
 use crate::submission::check_new_place;
+
+pub(super) const LIGHTS_FORMAT: &str = "mateval-fitted-lights/2";
+
+/// The fitted lights of a scene.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct LightsFile {
+    /// [`LIGHTS_FORMAT`].
+    pub(super) format: String,
+    /// Which lights were given the chance to shine.
+    pub(super) candidates: CandidateLights,
+    /// Candidates of the room first, then the lights of the stage.
+    pub(super) lights: Vec<FittedLight>,
+}
+
+impl LightsFile {
+    /// The names of the lights.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.lights.iter().map(|fitted| fitted.light.name.as_str())
+    }
+}
 
 /// De-lights the photo of every scene. `out` receives `index.html` and for each scene a folder with `base_color.exr`,
 /// `roughness.exr`, `metallic.exr`, `shading.exr`, `gloss.exr`, `confidence.exr`, the same as PNG for the page with
@@ -37,13 +57,13 @@ pub fn write(
         let folder = work.path().join(scene.id.as_str());
         std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
         write_pictures(&folder, &delit, scene.exposure as f32)?;
-        let shown = page::Shown { id: scene.id.to_string(), lights: delit.lights.clone(), rounds: delit.rounds };
+        let shown = Shown { id: scene.id.to_string(), lights: delit.lights.clone(), rounds: delit.rounds };
         let lights = LightsFile { format: LIGHTS_FORMAT.to_owned(), candidates: options.lights, lights: delit.lights };
         json::write(&folder.join("lights.json"), &lights)?;
         scenes.push(shown);
     }
     let index = work.path().join("index.html");
-    std::fs::write(&index, page::html(&scenes)).map_err(SceneError::io("write", &index))?;
+    std::fs::write(&index, html(&scenes)).map_err(SceneError::io("write", &index))?;
     work.finish()?;
     Ok(scenes.len())
 }
@@ -73,4 +93,44 @@ fn write_pictures(folder: &Path, delit: &DelitPhoto, exposure: f32) -> Result<()
 /// A linear picture times `exposure` as people see it.
 pub(super) fn exposed(picture: &Picture<LinearRgb>, exposure: f32) -> Picture<SrgbRgb> {
     picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (v * exposure).clamp(0.0, 1.0)))).to_srgb()
+}
+
+/// A scene on the page.
+pub(super) struct Shown {
+    pub(super) id: String,
+    pub(super) lights: Vec<FittedLight>,
+    pub(super) rounds: usize,
+}
+
+const PICTURES: [(&str, &str); 7] = [
+    ("photo", "The photo"),
+    ("base_color", "Base colour"),
+    ("shading", "Light on a white surface, exposed as the photo"),
+    ("gloss", "Light that does not depend on base colour"),
+    ("confidence", "Confidence: black is unknown"),
+    ("roughness", "Roughness"),
+    ("metallic", "Metallic: white is a mirror"),
+];
+
+/// The page. Ids and names of lights contain no characters that are special in HTML.
+pub(super) fn html(scenes: &[Shown]) -> String {
+    let introduction = "A photo is base colour times the light on a white surface, plus light that does not depend on \
+                        base colour. <code>mateval baseline relight</code> lights the rooms anew.";
+    page("De-lit photos", introduction, &scenes.iter().map(section).collect::<String>())
+}
+
+fn section(Shown { id, lights, rounds }: &Shown) -> String {
+    let mut text = format!("<section><h2>{id}</h2><div class=\"pictures\">\n");
+    text.extend(PICTURES.map(|(file, caption)| figure(&format!("{id}/{file}.png"), id, caption)));
+    let count = lights.len();
+    text.push_str("</div><details><summary>");
+    write!(text, "{count} lights after {rounds} rounds").expect("writing to a String cannot fail");
+    text.push_str(
+        "</summary><div class=\"scroll\"><table><tr><th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr>\n",
+    );
+    text.extend(lights.iter().map(|FittedLight { light, radiance: [r, g, b] }| {
+        format!("<tr><td>{}</td><td>{r:.4}</td><td>{g:.4}</td><td>{b:.4}</td></tr>\n", light.name)
+    }));
+    text.push_str("</table></div></details></section>\n");
+    text
 }

@@ -12,7 +12,7 @@ use mateval_image::{LinearRgb, Normal};
 use mateval_tracer::{PhotoCache, Ray, Sampler, SurfaceHit};
 use rayon::prelude::*;
 
-use super::part_room::PartRoom;
+use super::room::PartRoom;
 
 /// A part that mirrors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,7 @@ const ROUGHNESSES: [f32; 4] = [0.02, 0.05, 0.1, 0.2];
 const RAYS: u32 = 8;
 
 /// The mirrors among the surfaces of the room.
-pub(super) fn find(room: &PartRoom, cache: &PhotoCache<'_>) -> BTreeMap<u16, Mirror> {
+pub(super) fn find_mirrors(room: &PartRoom, cache: &PhotoCache<'_>) -> BTreeMap<u16, Mirror> {
     let mut pixels: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
     for (k, part) in room.parts.pixels().iter().enumerate().filter(|(k, _)| room.valid.pixels()[*k]) {
         pixels.entry(*part).or_default().push(k);

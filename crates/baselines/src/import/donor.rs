@@ -7,10 +7,9 @@ use glam::{DVec3, Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::material::MaterialParameter;
 
-use super::error::{ImportError, Limited};
-use super::limits::MAX_TRIANGLES;
+use super::error::{ImportError, Limited, MAX_TRIANGLES};
 use crate::estimate::{GivenMaps, Values};
-use crate::median::DEFAULT;
+use crate::maps::DEFAULT;
 
 /// Triangles in the dataset's world space, each with a material.
 #[derive(Default)]
@@ -68,7 +67,6 @@ pub struct DonorGroup {
     pub triangles: Range<usize>,
 }
 
-/// A triangle of a donor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DonorTriangle {
     /// World space, in metres, +Y up.
@@ -104,7 +102,6 @@ pub struct DonorMaterial {
 /// A scalar of a material.
 #[derive(Clone)]
 pub struct Scalar {
-    /// The constant factor.
     pub factor: f32,
     /// A linear texture, and the index of the channel that is used.
     pub texture: Option<(Texture, usize)>,
@@ -177,7 +174,6 @@ impl Donor {
         self.triangles[triangle].corners.map(|corner| corner.as_dvec3())
     }
 
-    /// Appends a triangle.
     pub(super) fn push(&mut self, triangle: DonorTriangle) -> Result<(), ImportError> {
         if self.triangles.len() >= MAX_TRIANGLES {
             return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });

@@ -1,4 +1,4 @@
-//! Why a file of an import was refused.
+//! Why a file of an import was refused, and the largest files that are imported.
 
 use mateval_image::ImageError;
 use mateval_scene::findings::shortened;
@@ -6,7 +6,16 @@ use mateval_scene::gltf_error::GltfError;
 use mateval_scene::obj::ObjError;
 use mateval_scene::source_folder::FileFault;
 
-use super::limits::MAX_DEPTH;
+/// Largest number of triangles in a file.
+pub const MAX_TRIANGLES: usize = 5_000_000;
+/// Largest number of vertices in a file; a mesh that several nodes share counts for each of them.
+pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
+/// Largest number of texels in all textures of a file.
+pub const MAX_TEXELS: usize = 1 << 28;
+/// Largest depth of a glTF's tree of nodes.
+pub const MAX_DEPTH: usize = 64;
+/// Largest size of a file, and of all buffers of a glTF together, in bytes.
+pub const MAX_FILE_BYTES: u64 = 1 << 31;
 
 /// Why a file was refused. The caller adds the file's path.
 #[derive(Debug, thiserror::Error)]
@@ -39,7 +48,6 @@ pub enum ImportError {
     /// The file has more of something than is read.
     #[error("the file has more than {limit} {what}")]
     TooLarge {
-        /// What is limited.
         what: Limited,
         /// The largest number that is read.
         limit: u64,
@@ -55,42 +63,24 @@ pub enum ImportError {
     NoScene,
     /// A node is the child of two others, or of itself.
     #[error("node {node} is the child of two nodes; expected a tree")]
-    NotATree {
-        /// The node's index.
-        node: usize,
-    },
+    NotATree { node: usize },
     /// A node has too many ancestors.
     #[error("node {node} is nested more than {MAX_DEPTH} deep")]
-    TooDeep {
-        /// The node's index.
-        node: usize,
-    },
+    TooDeep { node: usize },
     /// A primitive of a node was refused.
     #[error("node {node} '{}': {source}", shortened(.name))]
     Node {
-        /// The node's index.
         node: usize,
         /// The node's name; empty where it has none.
         name: String,
-        /// What is wrong.
         source: Box<ImportError>,
     },
     /// A primitive lacks an attribute.
     #[error("expected the attribute {attribute}, found none")]
-    MissingAttribute {
-        /// Such as `POSITION`.
-        attribute: String,
-    },
+    MissingAttribute { attribute: String },
     /// An attribute has another number of entries than the positions.
     #[error("{attribute} has {found} entries; expected {expected}, as POSITION has")]
-    Count {
-        /// Such as `COLOR_0`.
-        attribute: String,
-        /// Its entries.
-        found: usize,
-        /// Those of `POSITION`.
-        expected: usize,
-    },
+    Count { attribute: String, found: usize, expected: usize },
     /// A number is infinite or NaN.
     #[error("{0} is not finite")]
     NotFinite(Place),
@@ -111,25 +101,19 @@ pub enum ImportError {
     OutOfRange {
         /// Such as `Kd`, or the JSON pointer of a glTF.
         key: String,
-        /// The material's name.
         material: String,
-        /// The values.
         found: Vec<f32>,
     },
     /// A group has a material that no MTL file defines.
     #[error("{}", undefined(.group, .material))]
     UndefinedMaterial {
-        /// The group's name.
         group: String,
         /// The material's name; empty where `usemtl` is missing.
         material: String,
     },
     /// A material without base colour.
     #[error("material '{}' has neither map_Kd nor Kd", shortened(.material))]
-    MissingColor {
-        /// The material's name.
-        material: String,
-    },
+    MissingColor { material: String },
     /// Entries of `<scene>.json` that are wrong, all of them.
     #[error("{}", listed(.0))]
     Materials(Vec<MaterialFault>),
@@ -155,10 +139,8 @@ pub enum Limited {
 /// A feature that is not read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unsupported {
-    /// Data inside a uri.
     #[error("data uris are not read; write a .glb, or files beside the .gltf")]
     DataUri,
-    /// Triangle strips and fans.
     #[error("strips and fans are not read; write triangles")]
     StripsAndFans,
     /// Copies of a node's mesh by `EXT_mesh_gpu_instancing`.

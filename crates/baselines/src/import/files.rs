@@ -1,17 +1,23 @@
-//! The folder of imported files: which file belongs to which instance or scene.
+//! The folder of imported files: which file belongs to which instance or scene; and `<scene>.json`, which holds one
+//! uniform material per part or instance.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::{InstanceId, SceneId};
+use mateval_scene::{InstanceId, PartSetId, SceneId, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::donor::Donor;
-use super::error::ImportError;
-use super::limits::MAX_FILE_BYTES;
+use super::error::{ImportError, MAX_FILE_BYTES, MaterialFault};
 use super::{gltf_donor, obj_donor};
 use crate::error::BaselineError;
+use crate::estimate::{GivenMaps, Values};
+use crate::geometry::{PartTriangles, SceneGeometry};
+use crate::maps::{DEFAULT, PartColors};
 
 /// Endings of mesh files, in the order in which they are preferred.
 const MESHES: [&str; 3] = ["glb", "gltf", "obj"];
@@ -110,4 +116,66 @@ impl ImportFolder {
         let io = |source| BaselineError::Io { action: "open", path: self.path.clone(), source };
         SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(io)
     }
+}
+
+/// A uniform material.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlatMaterial {
+    /// Linear base colour, 0 to 1.
+    pub base_color: [f32; 3],
+    /// Perceptual roughness, 0 to 1.
+    #[serde(default)]
+    pub roughness: Option<f32>,
+    /// Metallic, 0 to 1.
+    #[serde(default)]
+    pub metallic: Option<f32>,
+}
+
+/// Materials by the id of a part, or of an instance, which stands for all its parts without an entry of their own.
+pub type FlatMaterials = BTreeMap<String, FlatMaterial>;
+
+impl FlatMaterial {
+    fn values(&self) -> Values {
+        let [r, g, b] = self.base_color;
+        [r, g, b, self.roughness.unwrap_or(DEFAULT[3]), self.metallic.unwrap_or(DEFAULT[4])]
+    }
+
+    fn is_in_range(&self) -> bool {
+        let numbers = self.base_color.iter().chain(&self.roughness).chain(&self.metallic);
+        numbers.into_iter().all(|v| (0.0..=1.0).contains(v))
+    }
+}
+
+/// Reads the file. The error lists every wrong entry.
+pub fn read_flat_materials<'a>(
+    path: &Path,
+    geometry: &SceneGeometry<'a>,
+    set: Option<&PartSetId>,
+) -> Result<(PartColors<'a>, GivenMaps), BaselineError> {
+    let materials: FlatMaterials = json::read(path)?;
+    let triangles = PartTriangles::read(geometry, set)?;
+    let parts = triangles.parts;
+    let instances = geometry.scene.instances.iter().map(|instance| instance.id.as_str());
+    let known: BTreeSet<&str> = parts.iter().map(|part| part.id.as_str()).chain(instances).collect();
+    let unknown = materials.keys().filter(|id| !known.contains(id.as_str()));
+    let unknown = unknown.map(|id| MaterialFault::UnknownId(id.clone()));
+    let out_of_range = materials.iter().filter(|(_, material)| !material.is_in_range());
+    let out_of_range = out_of_range.map(|(id, _)| MaterialFault::OutOfRange(id.clone()));
+    let faults: Vec<MaterialFault> = unknown.chain(out_of_range).collect();
+    if !faults.is_empty() {
+        return Err(BaselineError::BadImport { path: path.to_owned(), source: ImportError::Materials(faults) });
+    }
+    let colors = PartColors::new(triangles, |part, instance| {
+        let own = materials.get(parts[part].id.as_str());
+        let material = own.or_else(|| materials.get(geometry.scene.instances[instance].id.as_str()));
+        material.map(FlatMaterial::values)
+    });
+    let any = |has: fn(&FlatMaterial) -> bool| materials.values().any(has);
+    let given = GivenMaps {
+        base_color: true,
+        roughness: any(|m| m.roughness.is_some()),
+        metallic: any(|m| m.metallic.is_some()),
+    };
+    Ok((colors, given))
 }

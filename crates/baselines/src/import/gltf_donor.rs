@@ -16,8 +16,9 @@ use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
-use super::error::{ImportError, Limited, Place, Unsupported};
-use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES};
+use super::error::{
+    ImportError, Limited, MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES, Place, Unsupported,
+};
 
 /// Numbers this far outside 0 to 1 are rounding, and are clamped.
 const ROUNDING: f32 = 0.001;

@@ -13,8 +13,7 @@ use mateval_scene::obj::{self, Materials, ObjLimits, ObjMaterial};
 use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
-use super::error::{ImportError, Limited, Place, Unsupported};
-use super::limits::{MAX_TEXELS, MAX_TRIANGLES};
+use super::error::{ImportError, Limited, MAX_TEXELS, MAX_TRIANGLES, Place, Unsupported};
 
 /// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
 pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor, ImportError> {

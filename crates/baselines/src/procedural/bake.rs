@@ -6,20 +6,16 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::uv_atlas::UvAtlas;
 use rayon::prelude::*;
 
-use super::part_material::{PartMaterial, completed};
-use super::residuals::Residuals;
-use super::scene_materials::SceneMaterials;
+use super::materials::{PartMaterial, Residuals, SceneMaterials, completed};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
-use crate::geometry::SceneGeometry;
+use crate::geometry::{SceneGeometry, SeenPixels};
 use crate::lift::{PartialAtlas, Texel, lift, place_of, texel_size_m};
 use crate::maps::Maps;
-use crate::seen::SeenPixels;
 
 /// Texels that are evaluated together.
 const TEXELS: usize = 4096;
 
-/// An instance's maps.
 pub struct Baked {
     /// The maps, with filled gutters.
     pub maps: Maps,
@@ -37,42 +33,27 @@ pub(super) fn bake_all(
     keep_seen: bool,
     mut each: impl FnMut(usize, Baked) -> Result<(), BaselineError>,
 ) -> Result<(), BaselineError> {
+    let (residuals, given) = (materials.residuals.as_deref(), materials.given);
+    let baker = Baker { of_part: &materials.of_part, residuals, given };
     for (at, instance) in geometry.scene.instances.iter().enumerate() {
-        if let Some(atlas) = &instance.atlas {
-            let known = match keep_seen {
-                true => lift(geometry, seen, estimate, at, atlas.size as usize),
-                false => unknown(geometry.mesh(at), atlas.size as usize),
-            };
-            each(at, bake(materials, geometry, known, keep_seen, at))?;
-        }
+        let Some(atlas) = &instance.atlas else { continue };
+        let mut known = match keep_seen {
+            true => lift(geometry, seen, estimate, at, atlas.size as usize),
+            false => unknown(geometry.mesh(at), atlas.size as usize),
+        };
+        let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
+        known.texels = known.texels.map(|texel| match texel {
+            Texel::Seen(values) => Texel::Seen(completed(values, given)),
+            other => other,
+        });
+        baker.fill_unseen(geometry.mesh(at), materials.triangles.of(at), &mut known);
+        // A graph has a roughness and a metallic of its own.
+        let has_graph = materials.has_graph(at);
+        let roughness = given.roughness || has_graph;
+        let maps = GivenMaps { base_color: true, roughness, metallic: given.metallic || has_graph };
+        each(at, Baked { maps: Maps::of_atlas(&known, maps), seen })?;
     }
     Ok(())
-}
-
-/// Completes an instance's atlas.
-fn bake(
-    materials: &SceneMaterials<'_>,
-    geometry: &SceneGeometry<'_>,
-    mut known: PartialAtlas,
-    keep_seen: bool,
-    instance: usize,
-) -> Baked {
-    let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
-    known.texels = known.texels.map(|texel| match texel {
-        Texel::Seen(values) => Texel::Seen(completed(values, materials.given)),
-        other => other,
-    });
-    let residuals = materials.residuals.as_deref();
-    let baker = Baker { of_part: &materials.of_part, residuals, given: materials.given };
-    baker.fill_unseen(geometry.mesh(instance), materials.triangles.of(instance), &mut known);
-    // A graph has a roughness and a metallic of its own.
-    let has_graph = materials.has_graph(instance);
-    let given = GivenMaps {
-        base_color: true,
-        roughness: materials.given.roughness || has_graph,
-        metallic: materials.given.metallic || has_graph,
-    };
-    Baked { maps: Maps::of_atlas(&known, given), seen }
 }
 
 /// An atlas of which nothing is known.

@@ -3,16 +3,14 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use mateval_procedural::fit::points::Point;
-use mateval_procedural::noise::cell::cell;
+use mateval_procedural::fit::Point;
+use mateval_procedural::noise::cell;
 use mateval_scene::{Camera, PartSetId};
 
 use super::part_frame::{Chart, PartFrame, Triangle};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
-use crate::geometry::SceneGeometry;
-use crate::part_triangles::PartTriangles;
-use crate::seen::{SeenPixels, SeenPoint};
+use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels, SeenPoint};
 
 /// A pixel that shows a part.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +21,6 @@ pub(super) struct Sample {
     pub(super) chart: Chart,
     /// The place in world space.
     pub(super) position: DVec3,
-    /// The estimate.
     pub(super) values: Values,
     /// The same as a point of the unfolded box.
     pub(super) point: Point,

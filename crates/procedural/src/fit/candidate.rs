@@ -1,18 +1,19 @@
-//! A graph with the settings that a fit gave it: what a fit returns and what textures are made of.
+//! A graph with the settings that a fit gave it: what a fit returns and what textures are made of. Beside it, what is
+//! known before anything is seen: how usual the sizes of a graph are (in metres, a plank and a strip of parquet differ,
+//! and so do leather and roughcast), and which graphs are likely on which things: weak odds, so that what is seen
+//! decides.
 
 use std::sync::Arc;
 
-use super::colors::mean_square;
-use super::model::Model;
-use super::points::Point;
-use super::roles::{Role, role};
-use crate::batch::Evaluator;
-use crate::graph::Graph;
-use crate::lanes::{LANES, Points};
+use super::Point;
+use super::least_squares::mean_square;
+use super::model::{Model, Role, is_length, role};
+use crate::evaluator::{Evaluator, Points};
+use crate::graph::{Graph, Settings, slots};
 use crate::library::Class;
-use crate::noise::cell::cell;
-use crate::program::compile::{OUTPUTS, Program};
-use crate::settings::{Settings, slots};
+use crate::noise::cell;
+use crate::program::op::LANES;
+use crate::program::{OUTPUTS, Program};
 
 /// The number of places at which the mean colour of a pattern is measured.
 const MEAN_PLACES: u32 = 4096;
@@ -23,7 +24,6 @@ const MEAN_SIDE: f64 = 8.0;
 /// A graph with its settings.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The graph.
     pub graph: Arc<Graph>,
     /// The kind of pattern of a built-in graph; `None` for a user's.
     pub class: Option<Class>,
@@ -97,6 +97,91 @@ impl Candidate {
     }
 }
 
+/// The factor of a usual size that counts as one standard deviation.
+const FACTOR: f64 = 2.0;
+
+/// The greatest square that counts: what is seen decides on unusual sizes too.
+const MOST: f64 = 6.0;
+
+/// The mean square of the logarithms of a graph's sizes over those of its defaults, in standard deviations; 0 for graphs
+/// without sizes. Gaps and shifts do not count.
+pub(super) fn unusual(graph: &Graph, settings: &Settings) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (at, slot) in slots(graph).iter().enumerate() {
+        let is_size = matches!(role(graph, slot.parameter), Role::Shape | Role::RandomSize)
+            && is_length(graph, slot.parameter)
+            && !["joint", "gap"].contains(&graph.parameters[slot.parameter].name.as_str());
+        if is_size && slot.value > 0.0 {
+            let apart = libm::log(settings.numbers()[at].max(1e-9) / slot.value) / libm::log(FACTOR);
+            sum += (apart * apart).min(MOST);
+            count += 1.0;
+        }
+    }
+    sum / f64::max(count, 1.0)
+}
+
+/// How much a graph is preferred for a category, in log-odds from -1 to 1; 0 for categories that are not in the table.
+pub(super) fn log_odds(category: Option<&str>, graph: &str) -> f64 {
+    let Some(category) = category else { return 0.0 };
+    let category = category.to_lowercase();
+    let row = TABLE.iter().find(|row| row.words.iter().any(|word| category.contains(word)));
+    row.map_or(0.0, |row| match graph {
+        _ if row.likely.contains(&graph) => 1.0,
+        _ if row.unlikely.contains(&graph) => -1.0,
+        _ => 0.0,
+    })
+}
+
+/// Things of one kind.
+struct Row {
+    /// Words of which a category has one.
+    words: &'static [&'static str],
+    likely: &'static [&'static str],
+    unlikely: &'static [&'static str],
+}
+
+const FABRICS: &[&str] = &["stripes", "plaid", "houndstooth", "weave", "corduroy", "leather"];
+const STONES: &[&str] = &["roughcast", "concrete", "terrazzo", "granite", "travertine", "brick"];
+
+/// The first row that has a word of the category counts.
+const TABLE: [Row; 7] = [
+    Row {
+        words: &["table", "desk", "cabinet", "shelf", "wardrobe", "drawer", "door", "stool"],
+        likely: &["paint", "veneer", "marble"],
+        unlikely: &["brick", "roughcast", "carpet", "concrete"],
+    },
+    Row {
+        words: &["rug", "carpet"],
+        likely: &["carpet", "stripes", "trellis", "checks", "weave"],
+        unlikely: &["brick", "metal", "plank", "granite", "concrete"],
+    },
+    Row {
+        words: &["floor"],
+        likely: &["plank", "strip_parquet", "herringbone", "basket_parquet", "tile", "carpet"],
+        unlikely: &["houndstooth", "corduroy", "plaid", "leather", "metal", "roughcast"],
+    },
+    Row {
+        words: &["ceiling"],
+        likely: &["paint", "plaster"],
+        unlikely: &["carpet", "leather", "houndstooth", "corduroy", "granite"],
+    },
+    Row {
+        words: &["wall"],
+        likely: &["paint", "plaster", "brick", "roughcast", "tile"],
+        unlikely: &["carpet", "leather", "houndstooth", "corduroy", "metal"],
+    },
+    Row {
+        words: &["sofa", "couch", "chair", "bed", "pillow", "cushion", "curtain"],
+        likely: FABRICS,
+        unlikely: STONES,
+    },
+    Row {
+        words: &["lamp", "sink", "faucet", "refrigerator"],
+        likely: &["paint", "metal"],
+        unlikely: &["carpet", "brick"],
+    },
+];
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,5 +228,37 @@ mod tests {
         assert_eq!(together[140], plank.evaluate(&places[140..141])[0]);
         assert_ne!(together[140], together[10]);
         assert!(plank.evaluate(&[]).is_empty());
+    }
+
+    #[test]
+    fn twice_and_half_of_a_usual_size_are_as_unusual() {
+        let graph = entry("stripes").unwrap().graph().unwrap();
+        let of = |factor: f64| {
+            let mut settings = Settings::defaults(&graph);
+            let at = slots(&graph).iter().position(|slot| graph.parameters[slot.parameter].name == "period").unwrap();
+            *settings.number_mut(at) *= factor;
+            unusual(&graph, &settings)
+        };
+        assert_eq!(of(1.0), 0.0);
+        assert!((of(2.0) - 1.0).abs() < 1e-9 && (of(0.5) - 1.0).abs() < 1e-9);
+        // The twin: one colour has no size.
+        let paint = entry("paint").unwrap().graph().unwrap();
+        assert_eq!(unusual(&paint, &Settings::defaults(&paint)), 0.0);
+    }
+
+    #[test]
+    fn known_words_prefer_graphs_and_unknown_ones_do_not() {
+        assert_eq!(log_odds(Some("Floor"), "plank"), 1.0);
+        assert_eq!(log_odds(Some("Corner Sofa"), "granite"), -1.0);
+        assert_eq!(log_odds(Some("Bedside Table"), "veneer"), 1.0);
+        assert_eq!(log_odds(Some("gizmo"), "plank"), 0.0);
+        assert_eq!(log_odds(None, "plank"), 0.0);
+    }
+
+    #[test]
+    fn every_graph_of_the_table_exists() {
+        for name in TABLE.iter().flat_map(|row| row.likely.iter().chain(row.unlikely)) {
+            assert!(entry(name).is_some(), "{name}");
+        }
     }
 }

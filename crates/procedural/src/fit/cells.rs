@@ -1,15 +1,17 @@
 //! Patterns of cells, such as tiles and boards, each of which has a tone of its own.
 //!
 //! A graph draws the tones at random, so they cannot be predicted. But wherever its cells are, the points of one cell
-//! must be alike: that shows where the cells are, and with the tones taken away the joints are plain to see. Rows of
-//! boards that begin at random are sought row by row ([`super::boards`]).
+//! must be alike: that shows where the cells are, and with the tones taken away the joints are plain to see.
+//!
+//! - Boards in rows begin at random: the beginning of each row is the one that makes the points of a board most alike.
+//! - Thin joints show a polish no way to their place from farther than their width, but the more of a cell is in place,
+//!   the more alike its points are: [`settled`] searches for the place of cells.
+//! - [`better`] decides what waves confuse: a size with its multiples and fractions, shifts of rows, and whole numbers.
 
-use super::boards::boards;
-use super::colors::project;
-use super::model::Model;
-use super::points::Point;
-use super::smooth::log_grey;
-use crate::settings::Settings;
+use super::least_squares::{log_grey, project};
+use super::model::{Layout, Model};
+use super::{Point, extent};
+use crate::graph::Settings;
 
 /// Points of which less than this is a cell belong to its joint.
 const LEAST_MASK: f64 = 0.5;
@@ -183,11 +185,256 @@ pub(super) fn without_tones(model: &Model, settings: &Settings, points: &[Point]
     }
 }
 
+/// The number of beginnings of a row that are compared, over the length of a board.
+const BEGINNINGS: usize = 12;
+
+/// The number that a board has is that of its row times this, and its place in the row.
+const ROW: i64 = 1 << 24;
+
+/// A point in its row.
+#[derive(Clone, Copy)]
+struct InRow {
+    /// The place of the point in the list.
+    at: usize,
+    row: i64,
+    /// Board lengths along the row.
+    along: f64,
+    log: f64,
+    weight: f64,
+}
+
+/// The number of each point's board, and the price of having chosen where the rows begin: the logarithm of the number
+/// of ways. `sizes` are the slots of the width and the length of a board.
+fn boards(model: &Model, settings: &Settings, [width, length]: [usize; 2], points: &[Point]) -> (Vec<i64>, f64) {
+    let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
+    let (sin, cos) = libm::sincos(number("theta").to_radians());
+    let (t_u, t_v) = (number("t_u"), number("t_v"));
+    let [width, length] = [width, length].map(|at| settings.numbers()[at].max(1e-9));
+    let in_row = |(at, point): (usize, &Point)| {
+        let (u, v) = (point.u - t_u, point.v - t_v);
+        let row = ((v * cos - u * sin) / width).floor() as i64;
+        InRow { at, row, along: (u * cos + v * sin) / length, log: log_grey(point), weight: point.weight }
+    };
+    let mut all: Vec<InRow> = points.iter().enumerate().map(in_row).collect();
+    all.sort_by(|a, b| a.row.cmp(&b.row).then(a.along.total_cmp(&b.along)));
+    let mut numbers = vec![0; points.len()];
+    let mut rows = 0;
+    for row in all.chunk_by(|a, b| a.row == b.row) {
+        let beginnings = (0..BEGINNINGS).map(|at| at as f64 / BEGINNINGS as f64);
+        let best = beginnings.map(|begin| (outer(row, begin), begin)).max_by(|a, b| a.0.total_cmp(&b.0));
+        let begin = best.map_or(0.0, |(_, begin)| begin);
+        row.iter().for_each(|point| numbers[point.at] = point.row * ROW + board(point, begin));
+        rows += 1;
+    }
+    (numbers, f64::from(rows) * libm::log(BEGINNINGS as f64))
+}
+
+fn board(point: &InRow, begin: f64) -> i64 {
+    (point.along + begin).floor() as i64
+}
+
+/// How much of the squares of a row is between boards: the sum of the squares of their sums over their weights.
+fn outer(row: &[InRow], begin: f64) -> f64 {
+    let of_board = |points: &[InRow]| {
+        let sum: f64 = points.iter().map(|point| point.weight * point.log).sum();
+        sum * sum / points.iter().map(|point| point.weight).sum::<f64>()
+    };
+    row.chunk_by(|a, b| board(a, begin) == board(b, begin)).map(of_board).sum()
+}
+
+/// The first step, in the least length of a cell; each next one is half as long.
+const STEP: f64 = 0.16;
+
+/// The number of steps' lengths.
+const LEVELS: i32 = 4;
+
+/// A change of the pattern that leaves the middle of the points where it is, but for shifts.
+#[derive(Clone, Copy)]
+enum Move<'a> {
+    Shift([f64; 2]),
+    Turn,
+    Scale(&'a [(&'a str, [f64; 2])]),
+}
+
+/// Moves, turns and scales the cells as long as that makes the points of a cell more alike. Nothing where a graph has no
+/// cells.
+pub(super) fn settled(model: &Model, layout: Layout, settings: Settings, points: &[Point]) -> Settings {
+    let Some(mut least) = cell_error(model, &settings, points) else { return settings };
+    let [both, u, v] = [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+    // The lengths that scale together, with the axes along which they scale the pattern.
+    let scales: Vec<Vec<(&str, [f64; 2])>> = match layout {
+        Layout::Similar { length, .. } => vec![vec![(length, both)]],
+        Layout::Rows { width, .. } => vec![vec![(width, v)]],
+        Layout::Axes { u: along, v: across, .. } => vec![vec![(along, u)], vec![(across, v)]],
+    };
+    let mut moves = vec![Move::Turn, Move::Shift([0.0, 1.0])];
+    if !matches!(layout, Layout::Rows { .. }) {
+        moves.push(Move::Shift([1.0, 0.0]));
+    }
+    moves.extend(scales.iter().map(|scale| Move::Scale(scale)));
+    let lengths = scales.iter().flatten().filter_map(|(name, _)| model.slot(name));
+    let size = lengths.map(|at| settings.numbers()[at]).fold(f64::MAX, f64::min);
+    let frame = Frame::new(points, size);
+    let mut best = settings;
+    for level in 0..LEVELS {
+        let step = STEP * size * libm::pow(0.5, f64::from(level));
+        for change in &moves {
+            for signed in [step, -step] {
+                let tried = frame.moved(model, &best, *change, signed);
+                let error = cell_error(model, &tried, points).unwrap_or(f64::INFINITY);
+                if error < least {
+                    (best, least) = (tried, error);
+                    break;
+                }
+            }
+        }
+    }
+    best
+}
+
+/// The middle of the points, and the distance from it at which a step is measured.
+struct Frame {
+    middle: [f64; 2],
+    reach: f64,
+}
+
+impl Frame {
+    fn new(points: &[Point], size: f64) -> Self {
+        let count = points.len().max(1) as f64;
+        let mean = |of: fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / count;
+        let [width, height] = extent(points);
+        Self { middle: [mean(|point| point.u), mean(|point| point.v)], reach: (0.4 * width.max(height)).max(size) }
+    }
+
+    /// The settings after a change by a step in metres, of points at the reach.
+    fn moved(&self, model: &Model, settings: &Settings, change: Move, step: f64) -> Settings {
+        let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
+        let mut moved = settings.clone();
+        // The middle in the frame of the pattern.
+        let (sin, cos) = libm::sincos(number("theta").to_radians());
+        let [du, dv] = [self.middle[0] - number("t_u"), self.middle[1] - number("t_v")];
+        let mut place = [du * cos + dv * sin, dv * cos - du * sin];
+        match change {
+            Move::Shift([u, v]) => place = [place[0] + step * u, place[1] + step * v],
+            Move::Turn => model.set(&mut moved, "theta", number("theta") + (step / self.reach).to_degrees()),
+            Move::Scale(lengths) => {
+                let factor = 1.0 + step / self.reach;
+                for (name, axes) in lengths {
+                    model.set(&mut moved, name, number(name) * factor);
+                    place = [0, 1].map(|axis| if axes[axis] > 0.0 { place[axis] * factor } else { place[axis] });
+                }
+            }
+        }
+        let turn = model.slot("theta").map_or(0.0, |at| moved.numbers()[at]);
+        let (sin, cos) = libm::sincos(turn.to_radians());
+        model.set(&mut moved, "t_u", self.middle[0] - (place[0] * cos - place[1] * sin));
+        model.set(&mut moved, "t_v", self.middle[1] - (place[0] * sin + place[1] * cos));
+        moved
+    }
+}
+
+/// By what a size is multiplied, with the number of places where the larger cells may begin.
+const FACTORS: [(f64, u32); 6] = [(0.5, 1), (2.0, 2), (1.0 / 3.0, 1), (3.0, 3), (1.5, 3), (2.0 / 3.0, 2)];
+
+/// The number of shifts from row to row that are tried.
+const SHIFTS: u32 = 80;
+
+/// The settings with the size, the shift of rows, or the whole number that leaves the least error of cells; `None` where
+/// those are the ones they have.
+pub(super) fn better(model: &Model, layout: Layout, settings: &Settings, points: &[Point]) -> Option<Settings> {
+    let before = cell_error(model, settings, points)?;
+    let mut all = match layout {
+        Layout::Axes { u, v, shift, .. } => {
+            let mut along = resized(model, settings, u, 0.0);
+            if let Some(shift) = shift {
+                along = along.into_iter().flat_map(|resized| same_rows(model, settings, resized, [u, shift])).collect();
+                along.extend(reshifted(model, settings, shift));
+            }
+            along.extend(resized(model, settings, v, 90.0));
+            along
+        }
+        Layout::Rows { width, length, .. } => {
+            let mut all = resized(model, settings, width, 90.0);
+            all.extend(lengthened(model, settings, length));
+            all
+        }
+        Layout::Similar { whole: Some((name, least, most)), .. } => numbered(model, settings, name, least..=most),
+        Layout::Similar { whole: None, .. } => return None,
+    };
+    all.retain(|tried| tried != settings);
+    let judged = all.into_iter().filter_map(|settings| Some((cell_error(model, &settings, points)?, settings)));
+    let (error, best) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (error < before).then_some(best)
+}
+
+/// The settings with other lengths of boards, about which no wave says anything.
+fn lengthened(model: &Model, settings: &Settings, length: &str) -> Vec<Settings> {
+    let Some(at) = model.slot(length) else { return Vec::new() };
+    let with_length = |step: i32| {
+        let mut lengthened = settings.clone();
+        model.set(&mut lengthened, length, settings.numbers()[at] * libm::exp(0.1 * f64::from(step)));
+        lengthened
+    };
+    (-12..=8).map(with_length).collect()
+}
+
+/// The settings with every value of a whole number.
+fn numbered(model: &Model, settings: &Settings, name: &str, range: std::ops::RangeInclusive<i32>) -> Vec<Settings> {
+    let with_number = |number: i32| {
+        let mut numbered = settings.clone();
+        model.set(&mut numbered, name, f64::from(number));
+        numbered
+    };
+    range.map(with_number).collect()
+}
+
+/// The settings with all shifts from row to row. Shifts add up, so that they have to be close.
+fn reshifted(model: &Model, settings: &Settings, shift: &str) -> Vec<Settings> {
+    let shifted = |at: u32| {
+        let mut shifted = settings.clone();
+        model.set(&mut shifted, shift, f64::from(at) / f64::from(SHIFTS));
+        shifted
+    };
+    (0..SHIFTS).map(shifted).collect()
+}
+
+/// Settings of another length with the shifts from row to row that leave every row where it was: up to one of the
+/// former lengths.
+fn same_rows(model: &Model, before: &Settings, resized: Settings, [length, shift]: [&str; 2]) -> Vec<Settings> {
+    let (Some(length_at), Some(shift_at)) = (model.slot(length), model.slot(shift)) else { return Vec::new() };
+    let factor = resized.numbers()[length_at] / before.numbers()[length_at].max(1e-12);
+    let with_shift = |lengths: u32| {
+        let share = (before.numbers()[shift_at] + f64::from(lengths)) / factor.max(1e-12);
+        let mut shifted = resized.clone();
+        model.set(&mut shifted, shift, share - share.floor());
+        shifted
+    };
+    (0..factor.ceil().clamp(1.0, 3.0) as u32).map(with_shift).collect()
+}
+
+/// The settings with other sizes along an axis, which is at an angle in degrees to the pattern's first.
+fn resized(model: &Model, settings: &Settings, name: &str, turn: f64) -> Vec<Settings> {
+    let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
+    let (sin, cos) = libm::sincos((number("theta") + turn).to_radians());
+    let mut all = Vec::new();
+    for (factor, places) in FACTORS {
+        for place in 0..places {
+            let along = f64::from(place) * number(name) * factor / f64::from(places);
+            let mut resized = settings.clone();
+            model.set(&mut resized, name, number(name) * factor);
+            model.set(&mut resized, "t_u", number("t_u") + along * cos);
+            model.set(&mut resized, "t_v", number("t_v") + along * sin);
+            all.push(resized);
+        }
+    }
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::library::{Class, entry};
-    use crate::noise::cell::cell;
+    use crate::noise::cell;
 
     /// Tiles whose tones have nothing to do with those that the graph would draw.
     fn tiles() -> (Model, Settings, Vec<Point>) {
@@ -227,5 +474,40 @@ mod tests {
         // The twin: a graph without cells takes nothing away.
         let stripes = Model::new(entry("stripes").unwrap().graph().unwrap(), Some(Class::Stripe));
         assert_eq!(without_tones(&stripes, &stripes.start(), &points), points);
+    }
+
+    /// Boards whose rows begin elsewhere than the graph's have numbers of their own.
+    #[test]
+    fn boards_that_begin_anywhere_are_found() {
+        let model = Model::new(entry("plank").unwrap().graph().unwrap(), Some(Class::Lattice));
+        let settings = model.start();
+        let sizes = ["width", "length"].map(|name| model.slot(name).unwrap());
+        let [width, length] = sizes.map(|at| settings.numbers()[at]);
+        let random = |i: u32, of: f64| cell(f64::from(i) + 0.5, of);
+        let planted = |u: f64, v: f64| {
+            let row = (v / width).floor();
+            [row, (u / length + (8.0 * cell(row + 0.5, 9.5)).floor() / 12.0).floor()]
+        };
+        let place = |i: u32| {
+            let (u, v) = (4.0 * random(i, 1.5), 1.5 * random(i, 2.5));
+            let [row, board] = planted(u, v);
+            let tone = 0.3 + 0.3 * cell(row + 30.5, board + 40.5);
+            Point { u, v, footprint: 0.002, albedo: [tone; 3], weight: 1.0 }
+        };
+        let points: Vec<Point> = (0..2000).map(place).collect();
+        let (found, _) = boards(&model, &settings, sizes, &points);
+        let share = |numbers: &[i64]| {
+            let is_right = |(i, j): &(usize, usize)| {
+                let same = planted(points[*i].u, points[*i].v) == planted(points[*j].u, points[*j].v);
+                (numbers[*i] == numbers[*j]) == same
+            };
+            let pairs: Vec<(usize, usize)> = (0..300).flat_map(|i| (0..i).map(move |j| (i, j))).collect();
+            pairs.iter().filter(|pair| is_right(pair)).count() as f64 / pairs.len() as f64
+        };
+        assert_eq!(share(&found), 1.0);
+        // The twin: boards of another length.
+        let mut longer = settings.clone();
+        *longer.number_mut(sizes[1]) = 1.4 * length;
+        assert!(share(&boards(&model, &longer, sizes, &points).0) < 0.999);
     }
 }

@@ -12,27 +12,17 @@
 
 use std::sync::Arc;
 
-use super::candidate::Candidate;
-use super::category::log_odds;
-use super::cells::{cell_error, excess, without_tones};
-use super::colors::{mean_square, project};
-use super::hypotheses::{Start, starts};
-use super::lm::polish;
-use super::model::Model;
-use super::octaves::better;
-use super::pattern::Pattern;
-use super::periods::layout;
-use super::points::{Point, split, thinned};
-use super::roles::Role;
-use super::settle::settled;
-use super::sizes::unusual;
-use super::smooth::flattened;
+use super::candidate::{Candidate, log_odds, unusual};
+use super::cells::{better, cell_error, excess, settled, without_tones};
+use super::least_squares::{flattened, mean_square, polish, project};
+use super::model::{Model, Role, layout};
+use super::starts::{Pattern, Start, starts};
 use super::texture::{Colors, Sight, Texture};
 use super::waves::{Wave, lines, waves};
+use super::{Point, split, thinned};
 use crate::error::ProceduralError;
-use crate::graph::Graph;
+use crate::graph::{Graph, Settings};
 use crate::library::{Class, LIBRARY, entry};
-use crate::settings::Settings;
 
 /// The graph of one colour.
 const PAINT: &str = "paint";
@@ -137,8 +127,8 @@ impl Fitter {
         Ok(Self { paint: Model::new(paint, Some(Class::Flat)), patterns, textures })
     }
 
-    /// Adds a user's graphs, which are fitted by the names of their parameters ([`super::roles`]) and by statistics only:
-    /// nothing is known of their periods.
+    /// Adds a user's graphs, which are fitted by the names of their parameters ([`super::model::Role`]) and by statistics
+    /// only: nothing is known of their periods.
     pub fn with_graphs(mut self, graphs: Vec<Graph>) -> Self {
         self.textures.extend(graphs.into_iter().map(|graph| Model::new(graph, None)));
         self

@@ -1,15 +1,128 @@
-//! A graph as a model of colours at points.
+//! A graph as a model of colours at points: what a fit does with its parameters, by the names that the built-in graphs
+//! use, which of them are periods, and the colours that it shows with their derivatives.
 
 use std::sync::Arc;
 
-use super::points::Point;
-use super::roles::{Role, is_length, role};
-use crate::batch::Evaluator;
-use crate::graph::Graph;
-use crate::lanes::{LANES, Lanes, Points};
+use super::Point;
+use crate::evaluator::{Evaluator, Points};
+use crate::graph::{FOOTPRINT, Graph, Settings, Slot, slots};
 use crate::library::Class;
-use crate::program::compile::Program;
-use crate::settings::{Settings, Slot, slots};
+use crate::program::Program;
+use crate::program::op::{LANES, Lanes};
+use crate::value::Type;
+
+/// What a parameter is to a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The turn of the pattern.
+    Turn,
+    /// The place of the pattern.
+    Shift,
+    /// A colour at places that can be predicted.
+    Color,
+    /// A colour at places that are random.
+    RandomColor,
+    /// How strong something random is; at its least value there is none of it.
+    Amplitude,
+    /// The size of something random, in metres or relative to another size.
+    RandomSize,
+    /// A length or a share of what can be predicted.
+    Shape,
+    /// Not visible in colours, or chosen by the fit in other ways.
+    Kept,
+}
+
+/// Sizes of what is random.
+const RANDOM_SIZES: [&str; 17] = [
+    "grain_size",
+    "stone_size",
+    "cloud_size",
+    "pore_size",
+    "chip_size",
+    "large_size",
+    "small_size",
+    "vein_scale",
+    "warp",
+    "sharpness",
+    "band_period",
+    "stretch",
+    "pile_size",
+    "cell_size",
+    "streak_length",
+    "streak_width",
+    "ring_period",
+];
+
+pub fn role(graph: &Graph, parameter: usize) -> Role {
+    let name = graph.parameters[parameter].name.as_str();
+    match (name, graph.parameters[parameter].value.kind()) {
+        ("theta", _) => Role::Turn,
+        ("t_u" | "t_v", _) => Role::Shift,
+        (FOOTPRINT | "softness" | "surface_roughness" | "row_random", _) => Role::Kept,
+        (_, Type::Color3) if is_random_color(&graph.name, name) => Role::RandomColor,
+        (_, Type::Color3) => Role::Color,
+        // Ribs and threads are nothing but their tone.
+        ("depth_tone", Type::Float) if matches!(graph.name.as_str(), "corduroy" | "weave") => Role::Shape,
+        ("contrast" | "tone" | "grain" | "pile" | "clouds" | "edge_wear" | "pore_density", Type::Float)
+        | ("depth_tone" | "crease_tone", Type::Float) => Role::Amplitude,
+        (_, Type::Float) if RANDOM_SIZES.contains(&name) => Role::RandomSize,
+        ("melange" | "coverage" | "small_share", Type::Float) => Role::RandomSize,
+        (_, Type::Float) => Role::Shape,
+        _ => Role::Kept,
+    }
+}
+
+/// Whether a parameter is a length: graphs state units in the parameter's `doc`, the only place for them.
+pub(super) fn is_length(graph: &Graph, parameter: usize) -> bool {
+    graph.parameters[parameter].doc.as_ref().is_some_and(|doc| doc.contains("in metres"))
+}
+
+/// Colours of cells, chips, veins and the like.
+fn is_random_color(graph: &str, name: &str) -> bool {
+    match graph {
+        "terrazzo" | "granite" | "marble" | "travertine" | "veneer" | "carpet" => true,
+        "mosaic" => name != "joint_color",
+        _ => false,
+    }
+}
+
+/// How the sizes of a graph are found from waves.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Layout {
+    /// One length, by which the whole pattern scales, and its whole-number parameter, of which all values are tried.
+    Similar { length: &'static str, whole: Option<(&'static str, i32, i32)> },
+    /// Rows of cells that begin anywhere.
+    Rows { width: &'static str, length: &'static str, whole: Option<(&'static str, i32, i32)> },
+    /// A length along u and one along v, the period in lengths, and the shift from row to row.
+    Axes { u: &'static str, v: &'static str, periods: f64, shift: Option<&'static str> },
+}
+
+/// The layout of a built-in graph; `None` for those that are not fitted.
+pub(super) fn layout(graph: &str) -> Option<Layout> {
+    let similar = |length, whole| Some(Layout::Similar { length, whole });
+    let axes = |u, v, periods| Some(Layout::Axes { u, v, periods, shift: None });
+    let rows = |u, v, shift| Some(Layout::Axes { u, v, periods: 1.0, shift: Some(shift) });
+    match graph {
+        "stripes" => similar("period", None),
+        "corduroy" => similar("rib_period", None),
+        "hexagon" => similar("side", None),
+        "houndstooth" => similar("size", None),
+        "herringbone" => similar("width", Some(("ratio", 3, 7))),
+        "weave" => similar("pitch", Some(("twill", 1, 3))),
+        "basket_parquet" => similar("square", Some(("strips", 2, 6))),
+        "mosaic" => similar("size", None),
+        "concrete" => axes("panel_u", "panel_v", 1.0),
+        "plank" => Some(Layout::Rows { width: "width", length: "length", whole: None }),
+        "strip_parquet" => Some(Layout::Rows { width: "width", length: "length", whole: Some(("strips", 2, 4)) }),
+        "tile" => axes("size_u", "size_v", 1.0),
+        "brick" => rows("size_u", "size_v", "row_shift"),
+        "dots" => rows("pitch_u", "pitch_v", "stagger"),
+        "trellis" => axes("pitch_u", "pitch_v", 1.0),
+        "plaid" => axes("period_u", "period_v", 1.0),
+        "checks" => axes("size_u", "size_v", 2.0),
+        _ => None,
+    }
+}
 
 /// The parameters of cells that have a tone of their own.
 #[derive(Clone, Debug)]

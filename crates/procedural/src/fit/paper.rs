@@ -15,12 +15,11 @@
 
 use super::candidate::Candidate;
 use super::choose::{Fit, Fitter};
-use super::model::Model;
-use super::pairs::Pairs;
-use super::points::{Point, median, split};
-use super::roles::{Role, role};
+use super::model::{Model, Role, role};
+use super::statistics::Pairs;
+use super::{Point, median, split};
 use crate::error::ProceduralError;
-use crate::settings::Settings;
+use crate::graph::Settings;
 
 const TURNS: [f64; 4] = [-45.0, 0.0, 45.0, 90.0];
 const SCALES: u32 = 8;
@@ -230,7 +229,7 @@ fn logs(pairs: &Pairs, colors: &[[f64; 3]]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::cell::cell;
+    use crate::noise::cell;
 
     /// The slopes of the loss are those of central differences.
     #[test]

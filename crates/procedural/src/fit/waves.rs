@@ -9,13 +9,12 @@ use std::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use super::points::{Point, extent, median};
-use super::smooth::{log_grey, smooth_part};
+use super::least_squares::{log_grey, smooth_part};
+use super::{Point, extent, median};
 
 /// Fewer points cannot distinguish a wave from chance.
 const LEAST_POINTS: usize = 50;
 
-/// A wave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wave {
     /// Periods a metre along u and v; the first one that is not zero is positive.
@@ -43,7 +42,6 @@ impl Wave {
         [cos, sin]
     }
 
-    /// The phase.
     pub(super) fn phase(&self) -> f64 {
         libm::atan2(self.amplitude[1], self.amplitude[0])
     }
@@ -106,7 +104,6 @@ impl Signal {
         re * re + im * im
     }
 
-    /// Takes a wave away.
     fn subtract(&mut self, wave: &Wave) {
         let [fu, fv] = wave.frequency;
         for (place, value) in self.places.iter().zip(&mut self.values) {
@@ -119,7 +116,6 @@ impl Signal {
 /// What makes a wave stand out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
-    /// Its power.
     Power,
     /// Its power over that of waves of similar period: joints, which have many harmonics, before the tones of cells.
     Contrast,
@@ -279,7 +275,7 @@ mod tests {
     fn stripes(period: f64, degrees: f64) -> Vec<Point> {
         let (sin, cos) = libm::sincos(degrees.to_radians());
         let point = |i: u32| {
-            let random = |k: i32| crate::noise::cell::cell(f64::from(i) + 0.5, f64::from(k) + 0.5);
+            let random = |k: i32| crate::noise::cell(f64::from(i) + 0.5, f64::from(k) + 0.5);
             let (s, t) = (random(0), random(1));
             let (u, v) = ((s - 0.5) * (1.0 + t), 2.0 * t * t);
             let stripe = if ((u * cos + v * sin) / period).rem_euclid(1.0) < 0.5 { 0.6 } else { 0.3 };
@@ -304,7 +300,7 @@ mod tests {
         // The twin: noise has no wave.
         let mut noise = stripes(0.2, 10.0);
         for (i, point) in noise.iter_mut().enumerate() {
-            point.albedo = [0.3 + 0.3 * crate::noise::cell::cell(i as f64 + 0.5, 9.5); 3];
+            point.albedo = [0.3 + 0.3 * crate::noise::cell(i as f64 + 0.5, 9.5); 3];
         }
         assert!(waves(&noise, 4)[0].share < 0.05);
     }

@@ -1,19 +1,52 @@
-//! The XML as a tree of plain elements, with its size and depth checked.
+//! The XML as a tree of plain elements, and the limits on this untrusted input, which are checked before memory is taken.
 
-use crate::finding::{Code, Findings};
-use crate::limits::Limits;
+use crate::error::{Code, Findings};
 use crate::value::shortened;
 
-/// One XML element.
+/// Upper bounds. A file that exceeds one is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of the file.
+    pub bytes: usize,
+    /// Elements, texts and comments of the XML.
+    pub xml_nodes: u32,
+    /// Attributes of an element. Each is compared with all earlier ones of its element.
+    pub attributes: usize,
+    /// Namespaces of the XML. An element that declares one copies all those of its parent.
+    pub namespaces: usize,
+    /// Depth of nested elements. The elements that are supported nest four deep.
+    pub xml_depth: usize,
+    pub nodes: usize,
+    pub parameters: usize,
+    /// Findings. Further ones are only counted.
+    pub findings: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            bytes: 4 << 20,
+            xml_nodes: 1 << 16,
+            attributes: 64,
+            namespaces: 16,
+            xml_depth: 8,
+            nodes: 2048,
+            parameters: 256,
+            findings: 200,
+        }
+    }
+}
+
+/// The greatest number of octaves of a fractal, since each costs as much as a noise.
+pub(super) const MOST_OCTAVES: i32 = 16;
+
 #[derive(Debug)]
 pub(super) struct Element {
-    /// The tag.
     pub(super) tag: String,
     /// The line, from 1.
     pub(super) line: usize,
     /// The attributes, in the order of the file.
     attributes: Vec<(String, String)>,
-    /// The child elements.
     pub(super) children: Vec<Element>,
 }
 
@@ -49,7 +82,6 @@ impl Element {
         }
     }
 
-    /// Reports child elements.
     pub(super) fn check_no_children(&self, findings: &mut Findings) {
         for child in &self.children {
             child.report(

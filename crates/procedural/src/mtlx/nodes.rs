@@ -1,21 +1,101 @@
-//! The nodes and outputs of a graph: their types, inputs and connections.
+//! What a `<nodegraph>` holds: its inputs as parameters, with `uimin` and `uimax` as their range; its nodes and outputs,
+//! with their types and connections, in an order in which each node follows those that it depends on.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::document::Element;
-use super::integers;
-use super::parameters::{kind_of, value_of};
-use crate::finding::{Code, Findings};
-use crate::graph::{Node, Output, Parameter, Source};
-use crate::limits::Limits;
-use crate::node::catalog::{is_ignored_input, signatures};
-use crate::node::kind::Kind;
-use crate::node::signature::Signature;
-use crate::value::{Type, shortened};
+use super::document::{Element, Limits, MOST_OCTAVES};
+use crate::error::{Code, Findings};
+use crate::graph::{FOOTPRINT, Node, Output, Parameter, Source};
+use crate::node::{Kind, Signature, is_ignored_input, signatures};
+use crate::value::{Type, Value, shortened};
+
+const KNOWN: [&str; 13] = [
+    "name",
+    "type",
+    "value",
+    "uimin",
+    "uimax",
+    "uisoftmin",
+    "uisoftmax",
+    "uistep",
+    "uiname",
+    "uifolder",
+    "uiadvanced",
+    "uniform",
+    "doc",
+];
+
+/// Reads the `<input>` children. One that cannot be read is reported and replaced by a zero, so that those that use it
+/// are still checked.
+pub(super) fn read_parameters(interface: &Element, limits: &Limits, findings: &mut Findings) -> Vec<Parameter> {
+    let inputs: Vec<&Element> = interface.children.iter().filter(|child| child.tag == "input").collect();
+    if inputs.len() > limits.parameters {
+        let message = format!("expected at most {} inputs, found {}", limits.parameters, inputs.len());
+        interface.report(findings, Code::TooMany, message);
+    }
+    inputs.into_iter().take(limits.parameters).map(|input| parameter(input, findings)).collect()
+}
+
+fn parameter(input: &Element, findings: &mut Findings) -> Parameter {
+    input.check_attributes(&KNOWN, findings);
+    input.check_no_children(findings);
+    let kind = kind_of(input, findings).unwrap_or(Type::Float);
+    if input.name() == FOOTPRINT && kind != Type::Float {
+        input.report(findings, Code::Type, format!("expected the type float, found {}", kind.word()));
+    }
+    let value = value_of(input, "value", kind, findings);
+    if value.is_none() && input.attribute("value").is_none() {
+        input.report(findings, Code::Attribute, "expected a default in the attribute 'value'".to_owned());
+    }
+    let parameter = Parameter {
+        name: input.name().to_owned(),
+        value: value.unwrap_or(Value::filled(kind, 0.0)),
+        least: value_of(input, "uimin", kind, findings),
+        most: value_of(input, "uimax", kind, findings),
+        doc: input.attribute("doc").map(str::to_owned),
+    };
+    check_range(input, &parameter, findings);
+    parameter
+}
+
+/// The type of an element; reports one that is missing or not supported.
+fn kind_of(element: &Element, findings: &mut Findings) -> Option<Type> {
+    let word = element.attribute("type").unwrap_or("");
+    let kind = Type::from_word(word);
+    if kind.is_none() {
+        let known: Vec<&str> = Type::ALL.iter().map(|kind| kind.word()).collect();
+        let message = format!("expected a type of {}, found '{}'", known.join(", "), shortened(word));
+        element.report(findings, Code::Type, message);
+    }
+    kind
+}
+
+/// The value of an attribute; reports one that is not of the type.
+fn value_of(element: &Element, key: &str, kind: Type, findings: &mut Findings) -> Option<Value> {
+    match Value::parse(kind, element.attribute(key)?) {
+        Ok(value) => Some(value),
+        Err(reason) => {
+            element.report(findings, Code::Value, format!("{key}: {reason}"));
+            None
+        }
+    }
+}
+
+fn check_range(input: &Element, parameter: &Parameter, findings: &mut Findings) {
+    let exceeds = |a: &Value, b: &Value| a.numbers().iter().zip(b.numbers()).any(|(a, b)| a > b);
+    let too_small = parameter.least.as_ref().is_some_and(|least| exceeds(least, &parameter.value));
+    let too_great = parameter.most.as_ref().is_some_and(|most| exceeds(&parameter.value, most));
+    if too_small || too_great {
+        let print = |value: &Option<Value>| value.map_or("none".to_owned(), |value| value.to_string());
+        let (least, most) = (print(&parameter.least), print(&parameter.most));
+        let message = format!("expected uimin <= value <= uimax, found {least}, {}, {most}", parameter.value);
+        input.report(findings, Code::Value, message);
+    }
+}
 
 /// Reads the nodes in the order of the file, and the outputs. A node that cannot be read is reported and left out;
 /// connections to it are not reported again. The places of nodes in sources are those of the returned list.
-pub(super) fn read(
+pub(super) fn read_nodes(
     graph: &Element,
     parameters: &[Parameter],
     limits: &Limits,
@@ -118,7 +198,7 @@ fn node(element: &Element, kind: Kind, signature: Signature, names: &Names, find
         child.check_no_children(findings);
     }
     for (def, source) in signature.inputs.iter().zip(&inputs).filter(|(def, _)| def.kind == Type::Integer) {
-        if let Some(message) = integers::fault(kind, &signature, def.name, source, names.parameters) {
+        if let Some(message) = integer_fault(kind, &signature, def.name, source, names.parameters) {
             element.report(findings, Code::Value, message);
         }
     }
@@ -206,4 +286,122 @@ fn outputs(graph: &Element, names: &Names, findings: &mut Findings) -> [Source; 
         }
         source(element, output.kind(), names, findings)
     })
+}
+
+/// Why an integer input is not usable. Octaves and styles may be parameters whose range fits; what selects a component
+/// must be a constant.
+fn integer_fault(
+    kind: Kind,
+    signature: &Signature,
+    input: &str,
+    source: &Source,
+    parameters: &[Parameter],
+) -> Option<String> {
+    let (most, may_vary) = match kind {
+        Kind::Fractal2d => (f64::from(MOST_OCTAVES), true),
+        Kind::WorleyNoise2d => (1.0, true),
+        Kind::Extract => (signature.inputs[0].kind.width() as f64 - 1.0, false),
+        // Only the first set of texture coordinates is evaluated.
+        Kind::Texcoord => (0.0, false),
+        _ => return None,
+    };
+    let (least_found, most_found) = match source {
+        Source::Unset => return None,
+        Source::Value(value) => (value.numbers()[0], value.numbers()[0]),
+        Source::Parameter(at) if may_vary => range(&parameters[*at]),
+        Source::Parameter(_) | Source::Node { .. } => return Some(format!("{input}: expected a constant")),
+    };
+    let fits = least_found >= 0.0 && most_found <= most;
+    (!fits).then(|| format!("{input}: expected {}, found {}", span(0.0, most), span(least_found, most_found)))
+}
+
+/// A range in words; one number where the ends are the same.
+fn span(least: f64, most: f64) -> String {
+    if least == most { least.to_string() } else { format!("{least} to {most}") }
+}
+
+/// The range of a parameter; without end where none is given.
+fn range(parameter: &Parameter) -> (f64, f64) {
+    let number = |value: Option<Value>, otherwise| value.map_or(otherwise, |value| value.numbers()[0]);
+    (number(parameter.least, f64::NEG_INFINITY), number(parameter.most, f64::INFINITY))
+}
+
+/// Sorts the nodes; among those that may come next, the first of the file does. `None`, with findings, where nodes
+/// depend on themselves.
+pub(super) fn sorted(
+    nodes: Vec<Node>,
+    outputs: [Source; 3],
+    graph: &Element,
+    findings: &mut Findings,
+) -> Option<(Vec<Node>, [Source; 3])> {
+    let needs: Vec<BTreeSet<usize>> = nodes.iter().map(needs).collect();
+    let order = peel(&needs);
+    if order.len() < nodes.len() {
+        report_cycles(&nodes, &needs, &order, graph, findings);
+        return None;
+    }
+    let mut place_of = vec![0; nodes.len()];
+    for (place, &node) in order.iter().enumerate() {
+        place_of[node] = place;
+    }
+    let moved = |source: Source| match source {
+        Source::Node { node, output } => Source::Node { node: place_of[node], output },
+        other => other,
+    };
+    let mut slots: Vec<Option<Node>> = nodes.into_iter().map(Some).collect();
+    let in_order = order.iter().filter_map(|&at| slots[at].take());
+    let in_order = in_order.map(|node| Node { inputs: node.inputs.into_iter().map(moved).collect(), ..node }).collect();
+    Some((in_order, outputs.map(moved)))
+}
+
+fn needs(node: &Node) -> BTreeSet<usize> {
+    let of = |source: &Source| match source {
+        Source::Node { node, .. } => Some(*node),
+        _ => None,
+    };
+    node.inputs.iter().filter_map(of).collect()
+}
+
+/// Nodes whose needs come before them, in order; without those that depend on a cycle.
+fn peel(needs: &[BTreeSet<usize>]) -> Vec<usize> {
+    let mut users: Vec<Vec<usize>> = vec![Vec::new(); needs.len()];
+    for (user, needed) in needs.iter().enumerate() {
+        needed.iter().for_each(|&node| users[node].push(user));
+    }
+    let mut missing: Vec<usize> = needs.iter().map(BTreeSet::len).collect();
+    let mut ready: BTreeSet<usize> = (0..needs.len()).filter(|&node| missing[node] == 0).collect();
+    let mut order = Vec::with_capacity(needs.len());
+    while let Some(node) = ready.pop_first() {
+        order.push(node);
+        for &user in &users[node] {
+            missing[user] -= 1;
+            if missing[user] == 0 {
+                ready.insert(user);
+            }
+        }
+    }
+    order
+}
+
+/// Reports the nodes of cycles: what remains after those before and those after all cycles are taken away.
+fn report_cycles(
+    nodes: &[Node],
+    needs: &[BTreeSet<usize>],
+    before: &[usize],
+    graph: &Element,
+    findings: &mut Findings,
+) {
+    let mut reversed = vec![BTreeSet::new(); nodes.len()];
+    for (user, needed) in needs.iter().enumerate() {
+        for &node in needed {
+            reversed[node].insert(user);
+        }
+    }
+    let outside: BTreeSet<usize> = before.iter().copied().chain(peel(&reversed)).collect();
+    // The first element of each name.
+    let named: BTreeMap<&str, &Element> = graph.children.iter().rev().map(|child| (child.name(), child)).collect();
+    for (_, node) in nodes.iter().enumerate().filter(|(at, _)| !outside.contains(at)) {
+        let element = named.get(node.name.as_str()).copied().unwrap_or(graph);
+        element.report(findings, Code::Cycle, "this node depends on itself".to_owned());
+    }
 }

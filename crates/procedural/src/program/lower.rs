@@ -1,13 +1,54 @@
-//! The translation of nodes that work on each component by itself. Each follows the definition of MaterialX 1.39
-//! (`stdlib_ng.mtlx` and the sources of its code generators).
+//! The translation of nodes to instructions. Each follows the definition of MaterialX 1.39 (`stdlib_ng.mtlx` and the
+//! sources of its code generators).
 
-use super::argument::{Argument, Arguments};
-use super::builder::Builder;
-use super::op::{Binary, Op, Reg, Test, Unary};
-use super::{pattern, vector};
-use crate::node::kind::Kind;
-use crate::node::signature::Signature;
+use super::Builder;
+use super::op::{Binary, Count, Op, Reg, Test, Unary, Worley};
+use crate::node::{Kind, Signature};
+use crate::noise::Channel;
 use crate::value::Type;
+
+pub(super) enum Argument {
+    /// One result for each component.
+    Regs(Vec<Reg>),
+    /// A whole number.
+    Count(Count),
+}
+
+/// The inputs of a node, in the order of its signature.
+#[derive(Clone, Copy)]
+struct Arguments<'a>(pub(super) &'a [Argument]);
+
+impl Arguments<'_> {
+    /// All components of an input; none for a whole number.
+    pub(super) fn all(&self, input: usize) -> &[Reg] {
+        match &self.0[input] {
+            Argument::Regs(regs) => regs,
+            Argument::Count(_) => &[],
+        }
+    }
+
+    /// A component of an input. A float serves as every component.
+    pub(super) fn at(&self, input: usize, component: usize) -> Reg {
+        let regs = self.all(input);
+        if regs.len() == 1 { regs[0] } else { regs[component] }
+    }
+
+    /// A whole number.
+    pub(super) fn count(&self, input: usize) -> Count {
+        match &self.0[input] {
+            Argument::Count(count) => *count,
+            Argument::Regs(_) => unreachable!("signatures give these inputs the type integer"),
+        }
+    }
+
+    /// A whole number that the reader has checked to be a constant.
+    pub(super) fn constant(&self, input: usize) -> usize {
+        match self.count(input) {
+            Count::Number(number) => usize::try_from(number).unwrap_or(0),
+            Count::Slot(_) => unreachable!("the reader refuses parameters here"),
+        }
+    }
+}
 
 /// The results of a node: the components of each output.
 pub(super) fn lower(b: &mut Builder, kind: Kind, signature: &Signature, arguments: &[Argument]) -> Vec<Vec<Reg>> {
@@ -17,15 +58,15 @@ pub(super) fn lower(b: &mut Builder, kind: Kind, signature: &Signature, argument
         Kind::Separate2 | Kind::Separate3 => args.all(0).iter().map(|&reg| vec![reg]).collect(),
         Kind::Texcoord => vec![vec![b.push(Op::PlaceU), b.push(Op::PlaceV)]],
         Kind::Position => vec![vec![b.push(Op::PlaceU), b.push(Op::PlaceV), b.number(0.0)]],
-        Kind::Convert if args.all(0).is_empty() => vec![vec![pattern::count(b, args.count(0))]],
+        Kind::Convert if args.all(0).is_empty() => vec![vec![count(b, args.count(0))]],
         Kind::Convert | Kind::Rotate2d | Kind::Combine2 | Kind::Combine3 | Kind::Extract | Kind::Luminance => {
-            vec![vector::lower(b, kind, out, args)]
+            vec![combined(b, kind, out, args)]
         }
         Kind::DotProduct | Kind::Magnitude | Kind::Distance | Kind::Normalize => {
-            vec![vector::lower(b, kind, out, args)]
+            vec![combined(b, kind, out, args)]
         }
         Kind::Noise2d | Kind::Fractal2d | Kind::CellNoise2d | Kind::WorleyNoise2d => {
-            vec![pattern::lower(b, kind, out, args)]
+            vec![noise(b, kind, out, args)]
         }
         _ => vec![each_component(b, kind, out, args)],
     }
@@ -147,4 +188,114 @@ fn switch(b: &mut Builder, x: impl Fn(usize) -> Reg) -> Reg {
         found = b.push(Op::Select(Test::Greater, [bound, which, x(input), found]));
     }
     found
+}
+
+/// The components of a node's output.
+fn combined(b: &mut Builder, kind: Kind, out: Type, args: Arguments) -> Vec<Reg> {
+    match kind {
+        Kind::Combine2 => (0..2).map(|input| args.at(input, 0)).collect(),
+        Kind::Combine3 => (0..3).map(|input| args.at(input, 0)).collect(),
+        Kind::Extract => vec![args.all(0)[args.constant(1)]],
+        Kind::Convert => convert(b, out, args.all(0)),
+        Kind::Rotate2d => rotate(b, args),
+        Kind::Luminance => vec![dot(b, args.all(0), args.all(1)); 3],
+        Kind::DotProduct => vec![dot(b, args.all(0), args.all(1))],
+        Kind::Magnitude => vec![length(b, args.all(0))],
+        Kind::Distance => {
+            let pairs = args.all(0).iter().zip(args.all(1));
+            let between: Vec<Reg> = pairs.map(|(&p, &q)| b.sub(p, q)).collect();
+            vec![length(b, &between)]
+        }
+        Kind::Normalize => {
+            let length = length(b, args.all(0));
+            args.all(0).iter().map(|&x| b.binary(Binary::Div, x, length)).collect()
+        }
+        _ => unreachable!("the caller passes these nodes only"),
+    }
+}
+
+/// A float fills all components; a longer vector is cut, a shorter one is filled with zeros.
+fn convert(b: &mut Builder, out: Type, from: &[Reg]) -> Vec<Reg> {
+    let zero = b.number(0.0);
+    let at = |c: usize| if from.len() == 1 { from[0] } else { from.get(c).copied().unwrap_or(zero) };
+    (0..out.width()).map(at).collect()
+}
+
+/// Clockwise for a positive angle in degrees, which turns what is drawn counterclockwise.
+fn rotate(b: &mut Builder, args: Arguments) -> Vec<Reg> {
+    let (x, y) = (args.at(0, 0), args.at(0, 1));
+    let radians_per_degree = b.number(std::f64::consts::PI / 180.0);
+    let angle = b.mul(args.at(1, 0), radians_per_degree);
+    let (sin, cos) = (b.unary(Unary::Sin, angle), b.unary(Unary::Cos, angle));
+    let (cos_x, sin_y) = (b.mul(cos, x), b.mul(sin, y));
+    let (cos_y, sin_x) = (b.mul(cos, y), b.mul(sin, x));
+    vec![b.add(cos_x, sin_y), b.sub(cos_y, sin_x)]
+}
+
+fn dot(b: &mut Builder, p: &[Reg], q: &[Reg]) -> Reg {
+    let products: Vec<Reg> = p.iter().zip(q).map(|(&p, &q)| b.mul(p, q)).collect();
+    products[1..].iter().fold(products[0], |sum, &product| b.add(sum, product))
+}
+
+fn length(b: &mut Builder, p: &[Reg]) -> Reg {
+    let square = dot(b, p, p);
+    b.unary(Unary::Sqrt, square)
+}
+
+/// How far the second component of a two-dimensional fractal is from the first.
+const SECOND_COMPONENT: [f64; 2] = [19.0, 193.0];
+
+/// The components of a noise. The place is the first input of all of them.
+fn noise(b: &mut Builder, kind: Kind, out: Type, args: Arguments) -> Vec<Reg> {
+    let place = [args.at(0, 0), args.at(0, 1)];
+    (0..out.width())
+        .map(|c| match kind {
+            Kind::Noise2d => {
+                let perlin = b.push(Op::Perlin(channel(out, c), place));
+                let scaled = b.mul(perlin, args.at(2, c));
+                b.add(scaled, args.at(1, 0))
+            }
+            Kind::Fractal2d => {
+                let sum = fractal(b, out, c, args, place);
+                b.mul(sum, args.at(4, c))
+            }
+            Kind::CellNoise2d => b.push(Op::Cell(place)),
+            Kind::WorleyNoise2d => {
+                let inputs = [place[0], place[1], args.at(1, 0)];
+                let rank = u8::try_from(c).expect("there are at most three components");
+                let worley = Worley { style: args.count(2), rank, cell: channel(out, c) };
+                b.push(Op::Worley(worley, inputs))
+            }
+            _ => unreachable!("the caller passes these nodes only"),
+        })
+        .collect()
+}
+
+/// Floats have a noise of their own; vectors and colours share one.
+fn channel(out: Type, component: usize) -> Channel {
+    match out {
+        Type::Float | Type::Integer => Channel::Scalar,
+        _ => Channel::Component(u8::try_from(component).expect("there are at most three components")),
+    }
+}
+
+/// A component of a fractal. Those of `vector2` are floats' fractals at two places.
+fn fractal(b: &mut Builder, out: Type, component: usize, args: Arguments, place: [Reg; 2]) -> Reg {
+    let (channel, place) = match (out, component) {
+        (Type::Vector2, 0) => (Channel::Scalar, place),
+        (Type::Vector2, _) => {
+            let offsets = SECOND_COMPONENT.map(|offset| b.number(offset));
+            (Channel::Scalar, [b.add(place[0], offsets[0]), b.add(place[1], offsets[1])])
+        }
+        _ => (channel(out, component), place),
+    };
+    b.push(Op::Fractal(channel, args.count(1), [place[0], place[1], args.at(2, 0), args.at(3, 0)]))
+}
+
+/// A whole number as a result.
+fn count(b: &mut Builder, count: Count) -> Reg {
+    match count {
+        Count::Number(number) => b.number(f64::from(number)),
+        Count::Slot(slot) => b.push(Op::Slot(slot)),
+    }
 }

@@ -1,9 +1,8 @@
 //! Files that are refused, with the name and line of every fault.
 
 use mateval_procedural::ProceduralError;
-use mateval_procedural::finding::Code;
-use mateval_procedural::limits::Limits;
-use mateval_procedural::mtlx::read_text;
+use mateval_procedural::error::Code;
+use mateval_procedural::mtlx::{Limits, read_text};
 
 use super::graphs::{findings, read, text};
 

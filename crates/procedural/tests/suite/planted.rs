@@ -1,17 +1,13 @@
 //! Fits of graphs to points that graphs have made: at an angle, with light that is left, and noise.
 
+use mateval_procedural::fit::Point;
 use mateval_procedural::fit::choose::{Fit, Fitter};
-use mateval_procedural::fit::points::Point;
 use mateval_procedural::library::{Class, entry};
-use mateval_procedural::limits::Limits;
-use mateval_procedural::mtlx::read_text;
+use mateval_procedural::mtlx::{Limits, read_text};
 use mateval_procedural::{Graph, ProceduralError, Settings};
 use rayon::prelude::*;
 
-use crate::planting::draw::{Draw, LENGTHS, draw, slot};
-use crate::planting::lattice::lattice_errors;
-use crate::planting::outcome::{Outcome, find, judged, outcome_as_paper, psnr};
-use crate::planting::view::seen;
+use crate::planting::{Draw, LENGTHS, Outcome, draw, find, judged, lattice_errors, outcome_as_paper, psnr, seen, slot};
 
 /// The settings of a graph with some changed.
 fn settings_of(graph: &Graph, set: &[(&str, &str)]) -> Settings {
