@@ -10,7 +10,7 @@ use image::{ImageDecoder as _, ImageReader};
 use moxcms::{ColorProfile, DataColorSpace, LocalizableString, ProfileText, ToneReprCurve, Xyzd};
 
 use crate::ImageError;
-use crate::png_header::PngHeader;
+use crate::png_io::PngHeader;
 
 /// Linear Rec. 709 from XYZ under D50, as ICC profiles have it: the inverse of the columns of the sRGB profile (ICC,
 /// "sRGB.icc", Bradford-adapted).

@@ -4,33 +4,63 @@
 //! typed pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for
 //! lookups ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
 //!
-//! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours
-//! between sRGB and linear.
+//! In between, [`limits`] are checked on a file's header before memory is taken, [`transfer`] converts colours between
+//! sRGB and linear, and [`store`] puts files in place whole.
 
 mod color_profile;
-mod encoding;
-pub mod error;
-pub mod exr_header;
 pub mod exr_io;
-pub mod file_kind;
-pub mod jpeg_io;
 pub mod limits;
-pub mod map_io;
-pub mod npy_header;
-mod npy_io;
-pub mod owner;
+pub mod npy_io;
 pub mod photo;
 pub mod picture;
-pub mod png_header;
 pub mod png_io;
 pub mod store;
-pub mod temporary;
-pub mod texel_grid;
 pub mod texture;
 pub mod texture_io;
 pub mod transfer;
 
-pub use error::ImageError;
+pub use limits::ImageError;
 pub use picture::{LUMINANCE, LinearRgb, Mask, Normal, Picture, SrgbRgb};
-pub use texel_grid::{TexelGrid, Wrap};
-pub use texture::{Texels, Texture};
+pub use texture::{TexelGrid, Texels, Texture, Wrap};
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod map_io {
+    pub use crate::texture_io::{exr_color, exr_scalar, png_color, png_scalar};
+}
+#[doc(hidden)]
+pub mod texel_grid {
+    pub use crate::texture::{TexelGrid, Wrap};
+}
+#[doc(hidden)]
+pub mod exr_header {
+    pub use crate::exr_io::{EXR_SIGNATURE, ExrChannel, ExrHeader, ExrHeaderError, ExrNumber};
+}
+#[doc(hidden)]
+pub mod png_header {
+    pub use crate::png_io::{PNG_SIGNATURE, PngColor, PngHeader, PngHeaderError};
+}
+#[doc(hidden)]
+pub mod jpeg_io {
+    pub use crate::png_io::{MAX_JPEG_SIDE, jpeg_bytes};
+}
+#[doc(hidden)]
+pub mod npy_header {
+    pub use crate::npy_io::{MAX_HEADER_BYTES, MAX_PREFIX_BYTES, NPY_SIGNATURE, NpyHeaderError, checked_data};
+}
+#[doc(hidden)]
+pub mod file_kind {
+    pub use crate::limits::{hint, is_lfs_pointer, mistaken_for, without_mark};
+}
+#[doc(hidden)]
+pub mod error {
+    pub use crate::limits::ImageError;
+}
+#[doc(hidden)]
+pub mod temporary {
+    pub use crate::store::{abandoned_beside, all_beside, beside, is_abandoned, is_temporary};
+}
+#[doc(hidden)]
+pub mod owner {
+    pub use crate::store::Owner;
+}

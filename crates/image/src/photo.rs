@@ -7,9 +7,8 @@ use image::metadata::Orientation;
 use image::{ImageDecoder as _, ImageReader};
 
 use crate::color_profile::Profile;
-use crate::encoding::Encoding;
-use crate::npy_header::NPY_SIGNATURE;
-use crate::texture_io::texture_and_alpha_of_bytes;
+use crate::npy_io::NPY_SIGNATURE;
+use crate::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
 
 /// A photo in linear light; alpha is dropped.
@@ -55,12 +54,10 @@ impl PhotoFile {
         self.encoding
     }
 
-    /// Pixels in a row.
     pub fn width(&self) -> usize {
         self.pixels.width()
     }
 
-    /// Rows.
     pub fn height(&self) -> usize {
         self.pixels.height()
     }

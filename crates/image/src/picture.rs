@@ -64,12 +64,10 @@ impl<T: Copy> Picture<T> {
         Self { width, height, pixels }
     }
 
-    /// Pixels in a row.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
     pub fn height(&self) -> usize {
         self.height
     }

@@ -1,7 +1,13 @@
-//! Reads and writes pictures as PNG: previews, ids and masks, without text, time or gamma chunks.
+//! Reads and writes pictures as PNG: previews, ids and masks, without text, time or gamma chunks; writes JPEG for pages.
+//!
+//! [`PngHeader`] states what a file holds, without decoding pixels.
 
+use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::Path;
+
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 
 use crate::limits::{check_size, read_file};
 use crate::store::write_whole;
@@ -175,9 +181,159 @@ pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageErro
     })
 }
 
+/// Most pixels in a row and most rows.
+pub const MAX_JPEG_SIDE: usize = u16::MAX as usize;
+
+/// The picture as a JPEG file of a quality of 1 to 100; none if it has no pixels or more than [`MAX_JPEG_SIDE`] a side.
+pub fn jpeg_bytes(picture: &Picture<[u8; 3]>, quality: u8) -> Option<Vec<u8>> {
+    let [width, height] = [picture.width(), picture.height()].map(|side| u16::try_from(side).ok().filter(|s| *s > 0));
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))
+        .encode(picture.pixels().as_flattened(), width?.into(), height?.into(), ExtendedColorType::Rgb8)
+        .ok()?;
+    Some(bytes)
+}
+
+/// The first bytes of a PNG.
+pub const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// The header's colour type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PngColor {
+    Grey,
+    Rgb,
+    /// Indices into a palette.
+    Palette,
+    GreyAlpha,
+    /// Red, green, blue with opacity.
+    Rgba,
+}
+
+impl PngColor {
+    /// The name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Grey => "grey",
+            Self::Rgb => "RGB",
+            Self::Palette => "palette",
+            Self::GreyAlpha => "grey with alpha",
+            Self::Rgba => "RGB with alpha",
+        }
+    }
+}
+
+/// Why the header of a PNG cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PngHeaderError {
+    /// The first bytes are not [`PNG_SIGNATURE`].
+    #[error("it does not begin with the signature of a PNG")]
+    NoSignature,
+    /// The first chunk is another one, or cut.
+    #[error("its first chunk is not a whole header (IHDR)")]
+    NoHeader,
+    /// The header is too short or too long.
+    #[error("its header has {found} bytes; expected 13")]
+    HeaderLength { found: usize },
+    /// A colour type that PNG does not have.
+    #[error("its colour type is {found}; expected 0, 2, 3, 4 or 6")]
+    ColorType { found: u8 },
+}
+
+/// The header of a PNG, and the names of its chunks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PngHeader {
+    pub width: u32,
+    pub height: u32,
+    /// Bits a sample: 1, 2, 4, 8 or 16.
+    pub bit_depth: u8,
+    pub color: PngColor,
+    /// Whether rows are interlaced (Adam7).
+    pub interlaced: bool,
+    /// The names of all chunks.
+    pub chunks: BTreeSet<[u8; 4]>,
+    /// Whether the closing chunk (IEND) exists.
+    pub ended: bool,
+    /// Bytes behind the closing chunk.
+    pub trailing_bytes: usize,
+}
+
+impl PngHeader {
+    /// Reads the header and walks over the other chunks. Fails where the first chunk is not a valid header.
+    pub fn of(bytes: &[u8]) -> Result<Self, PngHeaderError> {
+        let Some(rest) = bytes.strip_prefix(PNG_SIGNATURE) else {
+            return Err(PngHeaderError::NoSignature);
+        };
+        let mut chunks = Chunks { rest };
+        let Some((b"IHDR", data)) = chunks.next() else {
+            return Err(PngHeaderError::NoHeader);
+        };
+        let mut header = Self::of_data(data)?;
+        for (name, _) in chunks.by_ref() {
+            header.chunks.insert(*name);
+            if name == b"IEND" {
+                header.ended = true;
+                break;
+            }
+        }
+        header.trailing_bytes = if header.ended { chunks.rest.len() } else { 0 };
+        Ok(header)
+    }
+
+    fn of_data(data: &[u8]) -> Result<Self, PngHeaderError> {
+        let (size, &[bit_depth, color, _, _, interlace]) = data
+            .split_first_chunk::<8>()
+            .and_then(|(size, rest)| Some((size, <&[u8; 5]>::try_from(rest).ok()?)))
+            .ok_or(PngHeaderError::HeaderLength { found: data.len() })?;
+        let side = |at: usize| u32::from_be_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
+        let color = match color {
+            0 => PngColor::Grey,
+            2 => PngColor::Rgb,
+            3 => PngColor::Palette,
+            4 => PngColor::GreyAlpha,
+            6 => PngColor::Rgba,
+            found => return Err(PngHeaderError::ColorType { found }),
+        };
+        Ok(Self {
+            width: side(0),
+            height: side(4),
+            bit_depth,
+            color,
+            interlaced: interlace != 0,
+            chunks: BTreeSet::new(),
+            ended: false,
+            trailing_bytes: 0,
+        })
+    }
+
+    /// Whether the file has a chunk with this name, as in `iCCP`.
+    pub fn has(&self, chunk: &[u8; 4]) -> bool {
+        self.chunks.contains(chunk)
+    }
+}
+
+/// Iterates over the names and data of chunks; ends at the first chunk that is cut off.
+struct Chunks<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Iterator for Chunks<'a> {
+    type Item = (&'a [u8; 4], &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (length, rest) = self.rest.split_first_chunk::<4>()?;
+        let (name, rest) = rest.split_first_chunk::<4>()?;
+        let (data, rest) = rest.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+        let (_, rest) = rest.split_first_chunk::<4>()?;
+        self.rest = rest;
+        Some((name, data))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::texture_io::{Encoding, texture_of_bytes};
+    use crate::{Texels, Wrap};
 
     #[test]
     fn round_trips() {
@@ -235,5 +391,45 @@ mod tests {
         encoder.set_color(png::ColorType::Rgb);
         drop(encoder.write_header().unwrap());
         bytes
+    }
+
+    #[test]
+    fn colours_survive_roughly_and_bytes_are_the_same() {
+        let picture = Picture::from_fn(40, 24, |x, y| [(6 * x) as u8, (10 * y) as u8, 128]);
+        let bytes = jpeg_bytes(&picture, 90).unwrap();
+        assert_eq!(bytes, jpeg_bytes(&picture, 90).unwrap());
+        let read = texture_of_bytes("a.jpg".as_ref(), bytes, Encoding::Srgb, Wrap::Clamp).unwrap();
+        let Texels::Srgb8(texels) = read.into_texels() else { panic!("a JPEG of colours has bytes") };
+        let worst = texels.iter().zip(picture.pixels()).flat_map(|(a, b)| (0..3).map(|c| a[c].abs_diff(b[c]))).max();
+        assert!((1..12).contains(&worst.unwrap()), "{worst:?}");
+        assert_eq!(jpeg_bytes(&Picture::filled(1 << 16, 1, [0; 3]), 90), None);
+    }
+
+    fn written() -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_rgba_bytes(&path, &Picture::filled(5, 3, [1; 4])).unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn the_header_of_a_written_picture() {
+        let header = PngHeader::of(&written()).unwrap();
+        assert_eq!((header.width, header.height, header.bit_depth, header.color), (5, 3, 8, PngColor::Rgba));
+        assert!(header.ended && header.has(b"IDAT") && !header.has(b"gAMA") && !header.interlaced);
+        assert_eq!(header.trailing_bytes, 0);
+    }
+
+    #[test]
+    fn what_is_cut_has_no_end_and_what_follows_is_counted() {
+        let mut bytes = written();
+        for length in 33..bytes.len() - 1 {
+            assert!(!PngHeader::of(&bytes[..length]).unwrap().ended, "{length}");
+        }
+        for length in 0..33 {
+            assert!(PngHeader::of(&bytes[..length]).is_err(), "{length}");
+        }
+        bytes.extend(b"more");
+        assert_eq!(PngHeader::of(&bytes).unwrap().trailing_bytes, 4);
     }
 }

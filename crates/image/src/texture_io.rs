@@ -1,14 +1,25 @@
-//! Reads textures from untrusted PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR and NumPy files.
+//! Reads textures from untrusted PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR and NumPy files, and from the bytes of a
+//! submission's maps.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 
-pub use crate::encoding::Encoding;
-use crate::limits::{check_size, read_file};
-use crate::npy_header::NPY_SIGNATURE;
-use crate::{ImageError, Texels, Texture, Wrap, exr_io, file_kind, npy_io};
+use crate::exr_io::{self, channels_of_bytes, scalar_of_bytes};
+use crate::limits::{check_size, hint, read_file};
+use crate::npy_io::{self, NPY_SIGNATURE};
+use crate::png_io::{Raw, decode_bytes};
+use crate::{ImageError, Texels, Texture, Wrap};
+
+/// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// With the sRGB curve.
+    Srgb,
+    /// Linearly.
+    Linear,
+}
 
 /// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
@@ -66,7 +77,7 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
         path: path.to_owned(),
         what: format!("not a valid picture: {error}"),
     };
-    let hint = file_kind::hint(&bytes);
+    let hint = hint(&bytes);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|source| ImageError::Io {
         action: "read",
         path: path.to_owned(),
@@ -114,6 +125,54 @@ fn color_texels(path: &Path, decoded: DynamicImage, encoding: Encoding) -> Resul
         return Err(ImageError::Invalid { path: path.to_owned(), what });
     }
     Ok(texels)
+}
+
+/// The sRGB colours of a PNG. Grey fills all three channels, alpha is dropped. `path` serves for errors only.
+pub fn png_color(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
+    let raw = decode_bytes(path, bytes)?;
+    let texels = if raw.depth == png::BitDepth::Sixteen {
+        Texels::Srgb16(triples(&raw.words(), raw.color.samples()))
+    } else {
+        Texels::Srgb8(triples(&raw.data, raw.color.samples()))
+    };
+    clamped(&raw, texels)
+}
+
+/// The first channel of a PNG, linear; kept as bytes if it has 8 bits, as floats if it has 16.
+pub fn png_scalar(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
+    let raw = decode_bytes(path, bytes)?;
+    let samples = raw.color.samples();
+    let texels = if raw.depth == png::BitDepth::Sixteen {
+        Texels::Grey(raw.words().iter().step_by(samples).map(|word| f32::from(*word) / 65535.0).collect())
+    } else {
+        Texels::Grey8(raw.data.iter().step_by(samples).copied().collect())
+    };
+    clamped(&raw, texels)
+}
+
+/// Channels `R`, `G`, `B` of an OpenEXR file, linear. Values may be NaN or infinite.
+pub fn exr_color(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
+    let (width, height, [r, g, b]) = channels_of_bytes(path, bytes, ["R", "G", "B"])?;
+    let texels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+    Texture::new(width, height, Texels::Linear(texels), Wrap::Clamp)
+}
+
+/// Channel `V` (or `Y`) of an OpenEXR file. Values may be NaN or infinite.
+pub fn exr_scalar(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
+    let picture = scalar_of_bytes(path, bytes)?;
+    Texture::new(picture.width(), picture.height(), Texels::Grey(picture.into_pixels()), Wrap::Clamp)
+}
+
+fn clamped(raw: &Raw, texels: Texels) -> Result<Texture, ImageError> {
+    Texture::new(raw.width, raw.height, texels, Wrap::Clamp)
+}
+
+fn triples<T: Copy>(samples: &[T], a_pixel: usize) -> Vec<[T; 3]> {
+    let triple = |pixel: &[T]| match *pixel {
+        [r, g, b] | [r, g, b, _] => [r, g, b],
+        _ => [pixel[0]; 3],
+    };
+    samples.chunks_exact(a_pixel).map(triple).collect()
 }
 
 #[cfg(test)]
@@ -217,5 +276,48 @@ mod tests {
         huge[21..25].copy_from_slice(&0x0fff_bffe_u32.to_le_bytes());
         let refused = read(&huge).unwrap_err().to_string();
         assert!(refused.contains("16383x16383 pixels; expected"), "{refused}");
+    }
+
+    /// The values equal those of `read_texture`, for every kind of PNG that this crate writes.
+    #[test]
+    fn it_reads_what_the_general_reader_reads() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let byte = |x: usize, y: usize, c: usize| (x * 31 + y * 57 + c * 91) as u8;
+        let writers: [&dyn Fn(); 6] = [
+            &|| {
+                png_io::write_rgb_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| byte(x, y, c))))
+                    .unwrap()
+            },
+            &|| {
+                png_io::write_rgba_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1, 2, 3].map(|c| byte(x, y, c))))
+                    .unwrap();
+            },
+            &|| png_io::write_grey_bytes(&path, &Picture::from_fn(5, 3, |x, y| byte(x, y, 0))).unwrap(),
+            &|| {
+                png_io::write_grey_alpha_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1].map(|c| byte(x, y, c))))
+                    .unwrap();
+            },
+            &|| {
+                png_io::write_ids(&path, &Picture::from_fn(5, 3, |x, y| 999_u16.wrapping_mul(byte(x, y, 0).into())))
+                    .unwrap()
+            },
+            &|| {
+                let words =
+                    Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| 999_u16.wrapping_mul(byte(x, y, c).into())));
+                png_io::write_rgb_words(&path, &words).unwrap();
+            },
+        ];
+        for (at, write) in writers.into_iter().enumerate() {
+            write();
+            let bytes = std::fs::read(&path).unwrap();
+            let [srgb, linear] =
+                [Encoding::Srgb, Encoding::Linear].map(|encoding| read_texture(&path, encoding, Wrap::Clamp).unwrap());
+            assert_eq!(png_color(&path, bytes.clone()).unwrap(), srgb, "{at}");
+            let scalar = png_scalar(&path, bytes).unwrap();
+            for (x, y) in (0..3).flat_map(|y| (0..5).map(move |x| (x, y))) {
+                assert_eq!(scalar.texel(x, y), [linear.texel(x, y)[0]; 3], "{at}");
+            }
+        }
     }
 }

@@ -2,16 +2,19 @@
 //!
 //! In: a room's geometry, its cameras, the light of a view split by lights, and the photo. Out: where lights may stand
 //! ([`light_stage`]) or what may glow ([`candidates`]), and how bright each one is, under one colour for all surfaces
-//! ([`light_fit`], with the rules in [`rules`]) or together with the colours of all parts ([`joint_fit`]).
+//! ([`light_fit`]) or together with the colours of all parts ([`joint_fit`]).
 
 pub mod candidates;
-mod cholesky;
-mod error;
 pub mod joint_fit;
 pub mod light_fit;
 pub mod light_stage;
-mod rectangle;
-pub mod rules;
-mod walls;
+mod ridge_fit;
 
-pub use error::LightError;
+pub use light_fit::LightError;
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod rules {
+    pub use crate::light_fit::FitRules;
+    pub use crate::light_stage::StageRules;
+}

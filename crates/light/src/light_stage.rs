@@ -3,22 +3,78 @@
 //! In: a world, its architecture, the cameras of all views. Out: named quads: a grid under the ceiling, one quad behind the
 //! camera, one in front of each wall that no view sees. The layout follows PSDR-Room (Yan et al., SIGGRAPH Asia 2023), whose
 //! constants are not published; ours are [`StageRules`]. No light lies in a view, and none casts a shadow.
+//!
+//! A wall is an upright piece of the architecture, in one plane and connected. It grows from the largest triangle that belongs to
+//! none yet. It takes in every triangle of that triangle's plane that is connected with it: no farther from one of its triangles
+//! than the tolerance, so that they share a corner or an edge, touch or overlap. Coplanar walls of different rooms are different
+//! walls.
 
-use glam::{DVec3, Vec3};
-use mateval_scene::Camera;
+use glam::{DVec2, DVec3, Vec3};
 use mateval_scene::dataset::SceneFile;
+use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Ray, StageLight, World};
+use serde::{Deserialize, Serialize};
 
-use crate::rectangle::{Rectangle, forward, is_in_picture};
-use crate::rules::StageRules;
-use crate::walls::walls;
+/// Where the lights of a stage are; lengths in metres. PSDR-Room's values are not published; these are MatEval's own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StageRules {
+    /// Number of horizontal directions along which the extent of the room is measured from the camera.
+    pub extent_directions: u32,
+    /// Approximate side of a ceiling cell. Cells fill the rectangle that the camera sees at its own height.
+    pub cell_m: f64,
+    /// Side of a cell's light, as a share of the cell's side.
+    pub cell_share: f64,
+    /// Distance from the ceiling down to its lights.
+    pub ceiling_gap_m: f64,
+    /// Side of the light behind the camera.
+    pub camera_side_m: f64,
+    /// Distance from the camera back to that light.
+    pub camera_distance_m: f64,
+    /// Width and height of a wall's light, as a share of the wall's own.
+    pub wall_share: f64,
+    /// Distance from a wall to its light.
+    pub wall_gap_m: f64,
+    /// Connected pieces of the architecture that are narrower or lower than this are not walls.
+    pub least_wall_m: f64,
+    /// A wall's visibility is tested at a grid of places, with this many along each side.
+    pub wall_samples: u32,
+    /// Sine of the largest angle between a ceiling's normal and the vertical, and between a wall's normal and the
+    /// horizontal, and between the normals of one wall's triangles and of its largest one.
+    pub upright_sine: f64,
+    /// The largest distance of a wall's corners from the plane of its largest triangle, and the largest gap within that plane
+    /// between connected triangles.
+    pub same_plane_m: f64,
+    /// A place is visible if nothing is nearer to the camera than the place by more than this.
+    pub visible_within_m: f64,
+}
+
+impl Default for StageRules {
+    /// The values of every protocol today.
+    fn default() -> Self {
+        Self {
+            extent_directions: 64,
+            cell_m: 1.0,
+            cell_share: 0.5,
+            ceiling_gap_m: 1e-3,
+            camera_side_m: 1.5,
+            camera_distance_m: 0.5,
+            wall_share: 0.8,
+            wall_gap_m: 1e-3,
+            least_wall_m: 0.5,
+            wall_samples: 16,
+            upright_sine: 0.05,
+            same_plane_m: 0.01,
+            visible_within_m: 2e-3,
+        }
+    }
+}
 
 /// One light of a stage, of radiance 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedLight {
     /// `ceiling_<column>_<row>`, `camera`, `wall_<number>`.
     pub name: String,
-    /// The quad.
     pub light: StageLight,
 }
 
@@ -166,5 +222,390 @@ impl LitRoom<'_> {
     }
 }
 
+struct Upright {
+    corners: [DVec3; 3],
+    /// Unit length.
+    normal: DVec3,
+    /// In square metres.
+    area: f64,
+}
+
+impl Upright {
+    /// None where the triangle has no area or is not upright.
+    fn new(rules: &StageRules, corners: [DVec3; 3]) -> Option<Self> {
+        let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let normal = cross.try_normalize()?;
+        (normal.y.abs() <= rules.upright_sine).then_some(Self { corners, normal, area: 0.5 * cross.length() })
+    }
+
+    /// Whether `other` lies in the plane of this triangle, whichever way it faces.
+    fn is_coplanar(&self, rules: &StageRules, other: &Self) -> bool {
+        let is_near = |corner: &DVec3| (*corner - self.corners[0]).dot(self.normal).abs() <= rules.same_plane_m;
+        self.normal.cross(other.normal).length() <= rules.upright_sine && other.corners.iter().all(is_near)
+    }
+}
+
+/// The rectangle around each wall of at least [`StageRules::least_wall_m`] in width and height; the wall with the largest
+/// triangle first.
+fn walls(rules: &StageRules, triangles: impl Iterator<Item = [DVec3; 3]>) -> Vec<Rectangle> {
+    let mut rest: Vec<Upright> = triangles.filter_map(|corners| Upright::new(rules, corners)).collect();
+    rest.sort_by(|a, b| b.area.total_cmp(&a.area));
+    let mut walls = Vec::new();
+    while !rest.is_empty() {
+        let seed = rest.remove(0);
+        walls.extend(grown(rules, &seed, &mut rest));
+    }
+    walls
+}
+
+/// Takes the triangles of the wall around `seed` out of `rest`; returns the rectangle around them if it is large enough.
+fn grown(rules: &StageRules, seed: &Upright, rest: &mut Vec<Upright>) -> Option<Rectangle> {
+    let up = (DVec3::Y - seed.normal * seed.normal.y).normalize();
+    let along = up.cross(seed.normal);
+    let flat = |triangle: &Upright| triangle.corners.map(|corner| DVec2::new(corner.dot(along), corner.dot(up)));
+    let (mut coplanar, others): (Vec<_>, Vec<_>) =
+        rest.drain(..).partition(|triangle| seed.is_coplanar(rules, triangle));
+    *rest = others;
+    // Take in what is near any triangle of the wall until nothing is.
+    let mut wall = vec![flat(seed)];
+    let mut done = 0;
+    while done < wall.len() {
+        let (near, far): (Vec<_>, Vec<_>) =
+            coplanar.into_iter().partition(|other| distance(&wall[done], &flat(other)) <= rules.same_plane_m);
+        wall.extend(near.iter().map(flat));
+        coplanar = far;
+        done += 1;
+    }
+    rest.extend(coplanar);
+    rest.sort_by(|a, b| b.area.total_cmp(&a.area));
+    // The rectangle around the wall.
+    let corners = || wall.iter().flatten().copied();
+    let low = corners().reduce(DVec2::min)?;
+    let high = corners().reduce(DVec2::max)?;
+    let size = high - low;
+    let corner = seed.normal * seed.corners[0].dot(seed.normal) + along * low.x + up * low.y;
+    (size.min_element() >= rules.least_wall_m).then_some(Rectangle { corner, sides: [along * size.x, up * size.y] })
+}
+
+/// The distance of two triangles in a plane; 0 where they overlap.
+fn distance(a: &[DVec2; 3], b: &[DVec2; 3]) -> f64 {
+    if contains(a, b[0]) || contains(b, a[0]) {
+        return 0.0;
+    }
+    let edges = |triangle: &[DVec2; 3]| [0, 1, 2].map(|k| [triangle[k], triangle[(k + 1) % 3]]);
+    let pairs = edges(a).into_iter().flat_map(|one| edges(b).map(|other| (one, other)));
+    pairs.map(|(one, other)| edge_distance(one, other)).fold(f64::INFINITY, f64::min)
+}
+
+fn contains(triangle: &[DVec2; 3], place: DVec2) -> bool {
+    let side = |k: usize| (triangle[(k + 1) % 3] - triangle[k]).perp_dot(place - triangle[k]);
+    let sides = [0, 1, 2].map(side);
+    sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
+}
+
+/// The distance of two line segments.
+fn edge_distance([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> f64 {
+    let side = |from: DVec2, to: DVec2, place: DVec2| (to - from).perp_dot(place - from);
+    if side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0 {
+        return 0.0;
+    }
+    let to_edge = |place: DVec2, from: DVec2, to: DVec2| {
+        let edge = to - from;
+        let share = ((place - from).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        place.distance(from + edge * share)
+    };
+    [to_edge(a, c, d), to_edge(b, c, d), to_edge(c, a, b), to_edge(d, a, b)].into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// A corner and two sides that are orthogonal to each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rectangle {
+    corner: DVec3,
+    sides: [DVec3; 2],
+}
+
+impl Rectangle {
+    /// The rectangle with these sides around `middle`.
+    fn around(middle: DVec3, sides: [DVec3; 2]) -> Self {
+        Self { corner: middle - (sides[0] + sides[1]) / 2.0, sides }
+    }
+
+    /// The unit normal on the side of `place`.
+    fn normal_towards(&self, place: DVec3) -> DVec3 {
+        let normal = self.sides[0].cross(self.sides[1]).normalize_or_zero();
+        if normal.dot(place - self.corner) < 0.0 { -normal } else { normal }
+    }
+
+    fn corners(&self) -> [DVec3; 4] {
+        let Self { corner, sides: [u, v] } = *self;
+        [corner, corner + u, corner + u + v, corner + v]
+    }
+
+    /// A light of radiance 1 whose front is on the side of `normal`.
+    fn facing(&self, normal: DVec3) -> StageLight {
+        let turned = self.sides[0].cross(self.sides[1]).dot(normal) < 0.0;
+        let positions = self.corners().map(|corner| corner.as_vec3()).to_vec();
+        let triangles = if turned { vec![[0, 2, 1], [0, 3, 2]] } else { vec![[0, 1, 2], [0, 2, 3]] };
+        let mesh = TriangleMesh { positions, triangles, ..Default::default() };
+        StageLight { mesh, radiance: [1.0; 3] }
+    }
+
+    /// Whether any of the rectangle is in the camera's picture, occlusion aside: clips the rectangle at each side of the
+    /// picture (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974) and checks that something remains.
+    fn meets_frustum(&self, camera: &Camera) -> bool {
+        let mut polygon = self.corners().to_vec();
+        for plane in frustum(camera) {
+            let inside = |place: DVec3| plane.dot(place - camera.position());
+            let mut rest = Vec::new();
+            for (k, &to) in polygon.iter().enumerate() {
+                let from = polygon[(k + polygon.len() - 1) % polygon.len()];
+                let (a, b) = (inside(from), inside(to));
+                if (a < 0.0) != (b < 0.0) {
+                    rest.push(from + (to - from) * (a / (a - b)));
+                }
+                if b >= 0.0 {
+                    rest.push(to);
+                }
+            }
+            polygon = rest;
+        }
+        !polygon.is_empty()
+    }
+}
+
+/// Whether `place` projects into the camera's picture, occlusion aside.
+fn is_in_picture(camera: &Camera, place: DVec3) -> bool {
+    frustum(camera).iter().all(|plane| plane.dot(place - camera.position()) >= 0.0)
+}
+
+/// The direction in which the camera looks.
+fn forward(camera: &Camera) -> DVec3 {
+    -camera.rotation().z_axis
+}
+
+/// Inward normals of the four planes through the camera's position and the sides of its picture.
+fn frustum(camera: &Camera) -> [DVec3; 4] {
+    let k = camera.intrinsics;
+    let (width, height) = (f64::from(k.width), f64::from(k.height));
+    let sides = [
+        // Left, right, top, bottom: a point is inside where x / depth is at least (0 - cx) / fx, and so on.
+        DVec3::new(k.fx, 0.0, -k.cx),
+        DVec3::new(-k.fx, 0.0, -(width - k.cx)),
+        DVec3::new(0.0, -k.fy, -k.cy),
+        DVec3::new(0.0, k.fy, -(height - k.cy)),
+    ];
+    sides.map(|side| camera.rotation() * side)
+}
+
+/// The stage of a plain closed room.
 #[cfg(test)]
-mod tests;
+mod tests {
+    use std::sync::Arc;
+
+    use mateval_scene::dataset::{FORMAT, Instance, SceneSource, TrueMaterials, View};
+    use mateval_scene::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
+    use mateval_testkit::box_room::{WALLS, box_room, camera, quad};
+
+    use super::*;
+
+    fn world(more: Vec<TriangleMesh>) -> World {
+        World::new(Arc::new(box_room(more))).unwrap()
+    }
+
+    fn rules() -> StageRules {
+        StageRules::default()
+    }
+
+    fn named(lights: &[NamedLight], start: &str) -> Vec<NamedLight> {
+        lights.iter().filter(|light| light.name.starts_with(start)).cloned().collect()
+    }
+
+    fn normal(light: &StageLight) -> Vec3 {
+        let [a, b, c] = light.mesh.corners(0);
+        (b - a).cross(c - a).normalize()
+    }
+
+    #[test]
+    fn an_empty_room() {
+        let lights = lights(&rules(), &world(Vec::new()), &WALLS, &[camera()]);
+        // Four columns; the picture's upper edge rises by 0.325 a metre: the ceiling, 1.3 above, is in view from 4 metres
+        // before the camera on. Cells end 0.25 beyond their middles, which are at 0.5, 1.5, ...
+        let ceiling = named(&lights, "ceiling");
+        assert_eq!(ceiling.len(), 4 * 3, "{:?}", ceiling.iter().map(|l| &l.name).collect::<Vec<_>>());
+        for NamedLight { light, .. } in &ceiling {
+            assert!(light.mesh.positions.iter().all(|p| (p.y - 2.499).abs() < 1e-5 && p.z > 1.6 && p.z < 5.5));
+            assert!((light.mesh.positions[0].distance(light.mesh.positions[1]) - 0.5).abs() < 1e-5);
+            assert!((normal(light) - Vec3::NEG_Y).length() < 1e-6);
+        }
+        let camera_light = &named(&lights, "camera")[0].light;
+        assert!((normal(camera_light) - Vec3::NEG_Z).length() < 1e-6);
+        assert!(camera_light.mesh.positions.iter().all(|p| (p.z - 6.0).abs() < 1e-5));
+        // The side walls are in view, that behind the camera is not: 80 % of 4 x 2.5.
+        let walls = named(&lights, "wall");
+        assert_eq!(walls.len(), 1);
+        let [a, b, c] = walls[0].light.mesh.corners(0).map(|p| p.as_dvec3());
+        assert!(((b - a).cross(c - a).length() - 0.64 * 10.0).abs() < 1e-4);
+        assert!((a.z - 5.999).abs() < 1e-5 && normal(&walls[0].light).z < -0.999);
+    }
+
+    /// Turned views see more of the room, so that fewer cells and walls get a light.
+    #[test]
+    fn no_light_lies_in_any_view() {
+        let turned = camera().turned(5.0, 5.0);
+        let room = world(Vec::new());
+        let one = lights(&rules(), &room, &WALLS, &[camera()]);
+        let two = lights(&rules(), &room, &WALLS, &[camera(), turned]);
+        assert!(named(&two, "ceiling").len() < named(&one, "ceiling").len());
+    }
+
+    /// A screen across the room hides its far part, and a low ledge is not a wall.
+    #[test]
+    fn hidden_and_low_pieces_get_no_light() {
+        let screen = quad([0.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 2.5, 0.0]);
+        let ledge = quad([0.0, 1.0, 5.9], [4.0, 0.0, 0.0], [0.0, 0.2, 0.0]);
+        let lights = lights(&rules(), &world(vec![screen, ledge]), &[2, 3, 4, 5, 6, 7], &[camera()]);
+        let ceiling = named(&lights, "ceiling");
+        assert!(!ceiling.is_empty());
+        assert!(ceiling.iter().all(|light| light.light.mesh.positions.iter().all(|p| p.z > 3.0)));
+        // Now no view sees the side walls either; neither the screen nor the ledge is one of them.
+        let walls = named(&lights, "wall");
+        assert_eq!(walls.len(), 3);
+        assert!(walls.iter().all(|wall| wall.light.mesh.positions[0].y < 0.3));
+        assert_eq!(walls.iter().filter(|wall| normal(&wall.light).x.abs() > 0.99).count(), 2);
+    }
+
+    /// The names of the lights in a room whose architecture is a piece of furniture or a wall that no view sees: a screen behind
+    /// the camera, of the given role and without a category.
+    fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
+        let screen = quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
+        let world = world(vec![screen]);
+        let wall = Role::Architecture { kind: "WallInner".to_owned() };
+        let roles = std::iter::repeat_n(&wall, 6).chain([role]);
+        let scene = SceneFile {
+            format: FORMAT.to_owned(),
+            id: SceneId::new("room").unwrap(),
+            source: SceneSource {
+                kind: SourceKind::Front3d,
+                house: "house".to_owned(),
+                states_roughness: false,
+                states_metallic: false,
+                shift_m: [0.0; 3],
+                files: Vec::new(),
+            },
+            lights: SceneLights::Stage,
+            materials: TrueMaterials::Converted,
+            exposure: 1.0,
+            photo: None,
+            views: vec![View {
+                id: ViewId::new("input").unwrap(),
+                x_deg: 0.0,
+                y_deg: 0.0,
+                camera: camera(),
+                wide: None,
+            }],
+            instances: roles.zip(1..).map(|(role, index)| instance(index, role)).collect(),
+            parts: Vec::new(),
+            part_sets: Vec::new(),
+            findings: Vec::new(),
+        };
+        scene_lights(&rules(), &scene, &world)
+    }
+
+    fn instance(index: u16, role: &Role) -> Instance {
+        Instance {
+            id: InstanceId::new(format!("i{index}")).unwrap(),
+            index: InstanceIndex(index.try_into().unwrap()),
+            name: String::new(),
+            role: role.clone(),
+            category: None,
+            super_category: None,
+            triangles: 2,
+            unstated: Vec::new(),
+            atlas: None,
+        }
+    }
+
+    /// Furniture without a category is no wall: it gets no light, and hides the wall behind it, which then gets none either.
+    #[test]
+    fn only_architecture_gets_wall_lights() {
+        for role in [Role::Furniture {}, Role::LightFixture {}, Role::Other {}] {
+            let walls = named(&lights_with_screen(&role), "wall");
+            let at_the_screen = |wall: &NamedLight| wall.light.mesh.positions.iter().any(|p| (p.z - 5.8).abs() < 0.01);
+            assert!(!walls.iter().any(at_the_screen), "{role:?}: {walls:?}");
+        }
+        // The twin: the same quad as architecture.
+        let walls = named(&lights_with_screen(&Role::Architecture { kind: "Other".to_owned() }), "wall");
+        assert!(walls.iter().any(|wall| (wall.light.mesh.positions[0].z - 5.799).abs() < 1e-4), "{walls:?}");
+    }
+
+    /// Two triangles that make a rectangle in the plane x = `x`, from `low` to `high` in z and y.
+    fn sheet(x: f64, low: [f64; 2], high: [f64; 2]) -> Vec<[DVec3; 3]> {
+        let at = |z: f64, y: f64| DVec3::new(x, y, z);
+        let [a, b, c, d] = [at(low[0], low[1]), at(high[0], low[1]), at(high[0], high[1]), at(low[0], high[1])];
+        vec![[a, b, c], [a, c, d]]
+    }
+
+    fn found(triangles: Vec<[DVec3; 3]>) -> Vec<[f64; 2]> {
+        let walls = walls(&StageRules::default(), triangles.into_iter());
+        walls.iter().map(|wall| wall.sides.map(|side| (side.length() * 1e6).round() / 1e6)).collect()
+    }
+
+    #[test]
+    fn coplanar_walls_of_two_rooms_are_two() {
+        let apart = [sheet(1.0, [0.0, 0.0], [4.0, 2.5]), sheet(1.0, [4.1, 0.0], [6.1, 2.5])].concat();
+        assert_eq!(found(apart), [[4.0, 2.5], [2.0, 2.5]]);
+        // The twin: no gap between them, and triangles that share no corner.
+        let together = [sheet(1.0, [0.0, 0.0], [4.0, 2.5]), sheet(1.0, [4.005, 1.0], [6.0, 2.0])].concat();
+        assert_eq!(found(together), [[6.0, 2.5]]);
+    }
+
+    #[test]
+    fn pieces_around_a_window_are_one_wall() {
+        let around = [
+            sheet(1.0, [0.0, 0.0], [4.0, 0.8]),
+            sheet(1.0, [0.0, 2.0], [4.0, 2.5]),
+            sheet(1.0, [0.0, 0.8], [1.0, 2.0]),
+            sheet(1.0, [3.0, 0.8], [4.0, 2.0]),
+        ];
+        assert_eq!(found(around.concat()), [[4.0, 2.5]]);
+        // The twin: without what joins them, sill and lintel are two.
+        assert_eq!(found(around[..2].concat()), [[4.0, 0.8], [4.0, 0.5]]);
+    }
+
+    #[test]
+    fn overlapping_sheets_are_one_wall_and_parallel_ones_are_not() {
+        let cross = [sheet(1.0, [0.0, 1.0], [4.0, 2.0]), sheet(1.0, [1.0, 0.0], [2.0, 2.5])].concat();
+        assert_eq!(found(cross), [[4.0, 2.5]]);
+        let parallel = [sheet(1.0, [0.0, 0.0], [4.0, 2.5]), sheet(1.02, [0.0, 0.0], [3.0, 2.5])].concat();
+        assert_eq!(found(parallel), [[4.0, 2.5], [3.0, 2.5]]);
+    }
+
+    #[test]
+    fn neither_order_nor_orientation_matters() {
+        let wall = [sheet(1.0, [0.0, 0.0], [4.0, 0.8]), sheet(1.0, [0.0, 0.8], [1.0, 2.0])].concat();
+        let mut turned: Vec<[DVec3; 3]> = wall.iter().rev().map(|[a, b, c]| [*a, *c, *b]).collect();
+        assert_eq!(found(wall), [[4.0, 2.0]]);
+        assert_eq!(found(turned.clone()), [[4.0, 2.0]]);
+        // Floors, low ledges and triangles without area are no walls.
+        turned.clear();
+        turned.extend(sheet(1.0, [0.0, 0.0], [4.0, 0.4]));
+        turned.push([DVec3::ZERO, DVec3::X * 4.0, DVec3::Z * 4.0]);
+        turned.push([DVec3::ZERO, DVec3::Y, DVec3::Y * 2.0]);
+        assert!(found(turned).is_empty());
+    }
+
+    #[test]
+    fn a_rectangle_meets_the_frustum_exactly_up_to_its_edge() {
+        let intrinsics = Intrinsics::from_fov_x(320, 180, 60_f64.to_radians());
+        let camera =
+            Camera::look_at(DVec3::new(2.0, 1.2, 5.5), DVec3::new(2.0, 1.2, 0.0), DVec3::Y, intrinsics).unwrap();
+        // At depth 5 the picture reaches 5 tan 30 = 2.887 to each side.
+        let beside = |x: f64| Rectangle { corner: DVec3::new(2.0 + x, 1.0, 0.5), sides: [DVec3::X, DVec3::Y * 0.1] };
+        assert!(beside(2.88).meets_frustum(&camera) && !beside(2.89).meets_frustum(&camera));
+        // Larger than the picture, with every corner outside.
+        let large = Rectangle { corner: DVec3::new(-50.0, -50.0, 0.5), sides: [DVec3::X * 100.0, DVec3::Y * 100.0] };
+        assert!(large.meets_frustum(&camera));
+        let behind = Rectangle { corner: DVec3::new(2.0, 1.0, 5.6), sides: [DVec3::X * 0.1, DVec3::Y * 0.1] };
+        assert!(!behind.meets_frustum(&camera));
+    }
+}

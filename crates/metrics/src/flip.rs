@@ -19,7 +19,7 @@ use mateval_image::{Mask, Picture, SrgbRgb};
 use rayon::prelude::*;
 
 use crate::MetricError;
-use crate::mask::reference_filled;
+use crate::pixel::reference_filled;
 use crate::pixel::{check_finite, check_pair, check_sizes};
 
 /// Pixels per degree of the observer's view: a monitor of 3840 pixels on 0.7 metres, seen from 0.7 metres, which is the

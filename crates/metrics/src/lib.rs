@@ -7,27 +7,36 @@
 //! [`mse()`], [`Psnr`] and [`delta_e()`] (CIEDE2000) compare pixels, [`mod@ssim`] compares 11x11 windows (Wang et al.
 //! 2004), [`flip()`] compares what an observer sees at a distance (Andersson et al. 2020), and [`lpips`] compares the
 //! responses of two trained networks (Zhang et al. 2018). The windows and filters of the last three reach across the
-//! mask's edge: [`mask`] holds the two ways to fill the pixels outside. FLIP has the reference's there, and SSIM and
+//! mask's edge: [`pixel`] holds the two ways to fill the pixels outside. FLIP has the reference's there, and SSIM and
 //! LPIPS have two rules each.
 //!
 //! Means are summed in `f64` in a fixed order, so the number of threads changes no bit. A NaN or infinite value inside
 //! the mask is an error. Values outside the mask are not read, save the reference's where they fill the prediction.
 
 pub mod delta_e;
-pub mod error;
 pub mod flip;
 pub mod lpips;
-pub mod mask;
 pub mod mse;
 pub mod pixel;
-pub mod psnr;
 pub mod ssim;
 
 pub use delta_e::delta_e;
-pub use error::MetricError;
 pub use flip::{flip, flip_map};
 pub use lpips::{Features, Lpips, Net};
-pub use mse::mse;
-pub use pixel::Pixel;
-pub use psnr::Psnr;
+pub use mse::{Psnr, mse};
+pub use pixel::{MetricError, Pixel};
 pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};
+
+// OLD PATHS, removed after the merge.
+#[doc(hidden)]
+pub mod mask {
+    pub use crate::pixel::{black_filled, pixel_count, reference_filled};
+}
+#[doc(hidden)]
+pub mod error {
+    pub use crate::pixel::{MetricError, Size};
+}
+#[doc(hidden)]
+pub mod psnr {
+    pub use crate::mse::Psnr;
+}

@@ -11,9 +11,9 @@ use mateval_image::{Mask, Picture};
 use rayon::prelude::*;
 
 use crate::MetricError;
-use crate::error::Size;
-use crate::mask::{black_filled, pixel_count};
+use crate::pixel::Size;
 use crate::pixel::{Pixel, check_finite, check_pair, check_sizes, size_of};
+use crate::pixel::{black_filled, pixel_count};
 
 /// Pixels from a window's centre to its edge.
 const RADIUS: usize = 5;

@@ -10,18 +10,15 @@ use gltf_json as json;
 use json::validation::{Checked, USize64};
 use mateval_image::store::write_whole;
 
-use crate::gltf_accessor::{indices, numbers, triangles};
-use crate::gltf_error::GltfError;
+use crate::gltf_file::{GltfError, indices, numbers, triangles};
 use crate::mesh::TriangleMesh;
 use crate::{Finding, SceneError, Severity};
 
 /// Largest file that is read, in bytes.
 pub const MAX_GLB_BYTES: u64 = 4 << 30;
 
-/// A named mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GlbNode {
-    /// The node's name.
     pub name: String,
     /// World space; at least one triangle.
     pub mesh: TriangleMesh,

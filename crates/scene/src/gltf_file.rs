@@ -1,15 +1,114 @@
 //! Parses untrusted glTF and GLB files, with what the `gltf` crate does not know or refuses: byte order marks, padding
 //! with NUL, textures without a picture, `EXT_texture_webp`, accessors without a buffer view, and which parameters of a
 //! material the file states.
+//!
+//! Nothing is read outside a buffer. Accessors may be sparse, without a buffer view (all zeros), or quantized
+//! (`KHR_mesh_quantization`).
 
+use gltf::accessor::DataType;
+use gltf::accessor::sparse::IndexType;
 use gltf::binary::Glb;
 use gltf::json::camera::Type;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
-use mateval_image::file_kind::{hint, without_mark};
+use mateval_image::limits::{hint, without_mark};
 use serde_json::{Map, Value};
 
-use crate::gltf_error::GltfError;
 use crate::material::StatedParameters;
+
+/// Why a glTF file, or a part of it, cannot be read. Accessors and buffer views are named by their index in the file.
+#[derive(Debug, thiserror::Error)]
+pub enum GltfError {
+    /// The `gltf` crate refuses it.
+    #[error("not valid glTF: {0}")]
+    Unsound(#[from] gltf::Error),
+    /// It is not the JSON of a glTF.
+    #[error("not valid glTF: {reason}{hint}")]
+    NotJson {
+        reason: serde_json::Error,
+        /// What the file is instead, and what to do; empty where that is not known.
+        hint: String,
+    },
+    /// The picture of a texture exists in a format that is not read.
+    #[error(
+        "/textures/{texture}: its only picture is KTX2 (KHR_texture_basisu), which is not read; convert the file with \
+         `gltf-transform ktxdecompress`"
+    )]
+    OnlyKtx2 { texture: usize },
+    /// A binary file states a length that cannot hold its own header.
+    #[error("not valid glTF: a binary file that states a length of {length} bytes; its header alone has 12")]
+    StatedLength {
+        /// The length that the file states.
+        length: u32,
+    },
+    /// An attribute of a mesh names an accessor that the file does not have.
+    #[error("not valid glTF: an attribute names an accessor that does not exist")]
+    NoAccessor,
+    /// An image has neither a file nor a buffer view with its type.
+    #[error("/images/{image}: expected `uri`, or `bufferView` and `mimeType`")]
+    NoImageSource { image: usize },
+    /// A camera lacks the projection of its type.
+    #[error("/cameras/{camera}: expected a projection of the camera's type")]
+    NoProjection { camera: usize },
+    /// The entries of an accessor hold another number of numbers.
+    #[error("accessor {accessor}: expected {expected} numbers an entry, found {found}")]
+    OtherNumbers {
+        accessor: usize,
+        /// Numbers an entry that are needed.
+        expected: usize,
+        /// Numbers an entry that it has.
+        found: usize,
+    },
+    /// An accessor states too many entries.
+    #[error("accessor {accessor}: expected at most {most} bytes, found more")]
+    AccessorTooLarge {
+        accessor: usize,
+        /// The most bytes of its contents.
+        most: usize,
+    },
+    /// An entry of an accessor is NaN or infinite.
+    #[error("accessor {accessor}: entry {entry} is not finite")]
+    NotFinite { accessor: usize, entry: usize },
+    /// An accessor that should hold indices holds something else.
+    #[error("accessor {accessor}: expected indices, found {found:?}")]
+    NotIndices {
+        accessor: usize,
+        /// The type of its numbers.
+        found: DataType,
+    },
+    /// An accessor of indices holds several an entry.
+    #[error("accessor {accessor}: expected one index an entry")]
+    NotOneIndex { accessor: usize },
+    /// An index names a vertex that the mesh does not have.
+    #[error("index {at} is {index}, expected less than {vertices}")]
+    IndexOutOfRange {
+        /// Its place among the indices.
+        at: usize,
+        index: u32,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// The number of indices is not a multiple of three.
+    #[error("{indices} indices, expected three a triangle")]
+    NotTriangles { indices: usize },
+    /// A buffer view reaches outside its buffer.
+    #[error("buffer view {view} reaches outside its buffer")]
+    ViewOutside { view: usize },
+    /// An accessor reaches outside its buffer.
+    #[error("accessor {accessor} reaches outside its buffer")]
+    AccessorOutside { accessor: usize },
+    /// A mesh of no primitive, or of several.
+    #[error("expected one primitive per mesh, found {found}")]
+    NotOnePrimitive { found: usize },
+    /// A mesh lacks an attribute or its indices.
+    #[error("expected {attribute}")]
+    Missing {
+        /// As in `POSITION`.
+        attribute: &'static str,
+    },
+    /// The attributes of a mesh differ in length.
+    #[error("expected as many entries of NORMAL and TEXCOORD_0 as of POSITION")]
+    CountsDiffer,
+}
 
 /// Length of a binary file's header, in bytes.
 const GLB_HEADER: u32 = 12;
@@ -21,7 +120,6 @@ pub const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 const KTX2: &str = "KHR_texture_basisu";
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// A parsed file.
 #[derive(Debug)]
 pub struct GltfFile {
     /// The JSON, validated. No material refers to a texture without a picture.
@@ -218,6 +316,131 @@ fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
         Some(camera) => Err(GltfError::NoProjection { camera }),
         None => Ok(()),
     }
+}
+
+/// The most bytes of one accessor's contents. One without a buffer view takes none in the file.
+const MOST_BYTES: usize = 1 << 31;
+
+/// The entries of an accessor of `N` numbers each, which may be NaN. Normalized integers stand for 0 to 1, or for -1 to 1
+/// (glTF 2.0, section 3.6.2.2), other integers for themselves.
+pub fn numbers<const N: usize>(
+    accessor: &gltf::Accessor<'_>,
+    buffers: &[impl AsRef<[u8]>],
+) -> Result<Vec<[f32; N]>, GltfError> {
+    let found = accessor.dimensions().multiplicity();
+    if found != N {
+        return Err(GltfError::OtherNumbers { accessor: accessor.index(), expected: N, found });
+    }
+    first_numbers(accessor, buffers)
+}
+
+/// As [`numbers`], of accessors that may have more than `N` numbers per entry; the first `N` count.
+pub fn first_numbers<const N: usize>(
+    accessor: &gltf::Accessor<'_>,
+    buffers: &[impl AsRef<[u8]>],
+) -> Result<Vec<[f32; N]>, GltfError> {
+    let found = accessor.dimensions().multiplicity();
+    if found < N {
+        return Err(GltfError::OtherNumbers { accessor: accessor.index(), expected: N, found });
+    }
+    let (data_type, normalized) = (accessor.data_type(), accessor.normalized());
+    let share = |value: f32, most: f32| if normalized { (value / most).max(-1.0) } else { value };
+    let number = |bytes: &[u8]| match data_type {
+        DataType::F32 => f32::from_bits(word(bytes)),
+        DataType::I8 => share(f32::from(bytes[0] as i8), 127.0),
+        DataType::U8 => share(f32::from(bytes[0]), 255.0),
+        DataType::I16 => share(f32::from(word(bytes) as i16), 32767.0),
+        DataType::U16 => share(f32::from(word(bytes) as u16), 65535.0),
+        DataType::U32 => word(bytes) as f32,
+    };
+    let size = data_type.size();
+    let bytes = entries(accessor, buffers, size * found)?;
+    let entry = |entry: &[u8]| std::array::from_fn(|c| number(&entry[size * c..size * (c + 1)]));
+    Ok(bytes.chunks_exact(size * found).map(entry).collect())
+}
+
+/// The entries of an accessor of integers.
+pub fn indices(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>]) -> Result<Vec<u32>, GltfError> {
+    let size = match accessor.data_type() {
+        DataType::U32 => 4,
+        DataType::U16 => 2,
+        DataType::U8 => 1,
+        found => return Err(GltfError::NotIndices { accessor: accessor.index(), found }),
+    };
+    if accessor.dimensions().multiplicity() != 1 {
+        return Err(GltfError::NotOneIndex { accessor: accessor.index() });
+    }
+    Ok(entries(accessor, buffers, size)?.chunks_exact(size).map(word).collect())
+}
+
+/// Splits indices into triangles. Fails where one is not below `vertices`, or their number is not a multiple of three.
+pub fn triangles(indices: Vec<u32>, vertices: usize) -> Result<Vec<[u32; 3]>, GltfError> {
+    if let Some(at) = indices.iter().position(|index| *index as usize >= vertices) {
+        return Err(GltfError::IndexOutOfRange { at, index: indices[at], vertices });
+    }
+    let (triangles, rest) = indices.as_chunks::<3>();
+    if rest.is_empty() { Ok(triangles.to_vec()) } else { Err(GltfError::NotTriangles { indices: indices.len() }) }
+}
+
+/// The bytes of a buffer view. Fails where it reaches outside its buffer.
+pub fn view_bytes<'a>(view: &gltf::buffer::View<'_>, buffers: &'a [impl AsRef<[u8]>]) -> Result<&'a [u8], GltfError> {
+    let outside = || GltfError::ViewOutside { view: view.index() };
+    let buffer = buffers.get(view.buffer().index()).ok_or_else(outside)?.as_ref();
+    let start = view.offset();
+    start.checked_add(view.length()).and_then(|end| buffer.get(start..end)).ok_or_else(outside)
+}
+
+/// The little-endian integer in four bytes or fewer.
+fn word(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
+}
+
+/// The accessor's entries, of `size` bytes each, one after the other. Fails where they reach outside a buffer.
+fn entries(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>], size: usize) -> Result<Vec<u8>, GltfError> {
+    let (index, count) = (accessor.index(), accessor.count());
+    let too_large = || GltfError::AccessorTooLarge { accessor: index, most: MOST_BYTES };
+    let bytes = count.checked_mul(size).filter(|bytes| *bytes <= MOST_BYTES).ok_or_else(too_large)?;
+    // The entries of the buffer view, or zeros.
+    let mut all = match accessor.view() {
+        Some(view) => strided(index, &view, buffers, accessor.offset(), count, size)?,
+        None => vec![0; bytes],
+    };
+    // Those that a sparse accessor replaces.
+    if let Some(sparse) = accessor.sparse() {
+        let (numbers, values) = (sparse.indices(), sparse.values());
+        let number_size = match numbers.index_type() {
+            IndexType::U8 => 1,
+            IndexType::U16 => 2,
+            IndexType::U32 => 4,
+        };
+        let replaced = sparse.count();
+        let places = strided(index, &numbers.view(), buffers, numbers.offset(), replaced, number_size)?;
+        let values = strided(index, &values.view(), buffers, values.offset(), replaced, size)?;
+        for (place, value) in places.chunks_exact(number_size).map(word).zip(values.chunks_exact(size)) {
+            let start = place as usize * size;
+            let target = all.get_mut(start..start + size);
+            target.ok_or(GltfError::AccessorOutside { accessor: index })?.copy_from_slice(value);
+        }
+    }
+    Ok(all)
+}
+
+/// `count` entries of `size` bytes from `offset` of a buffer view on, without the gaps between them.
+fn strided(
+    accessor: usize,
+    view: &gltf::buffer::View<'_>,
+    buffers: &[impl AsRef<[u8]>],
+    offset: usize,
+    count: usize,
+    size: usize,
+) -> Result<Vec<u8>, GltfError> {
+    let outside = || GltfError::AccessorOutside { accessor };
+    let slice = view_bytes(view, buffers).map_err(|_| outside())?;
+    let stride = view.stride().unwrap_or(size).max(size);
+    let used = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
+    let end = used.and_then(|used| used.checked_add(offset)).filter(|end| *end <= slice.len());
+    let data = slice.get(offset..end.ok_or_else(outside)?).ok_or_else(outside)?;
+    Ok((0..count).flat_map(|at| &data[at * stride..at * stride + size]).copied().collect())
 }
 
 #[cfg(test)]

@@ -50,7 +50,6 @@ macro_rules! id_type {
                 if is_id(&text) { Ok(Self(text)) } else { Err(BadId(text)) }
             }
 
-            /// The id as text.
             pub fn as_str(&self) -> &str {
                 &self.0
             }

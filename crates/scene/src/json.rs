@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use mateval_image::file_kind::{hint, without_mark};
 use mateval_image::limits::read_at_most;
+use mateval_image::limits::{hint, without_mark};
 use mateval_image::store::write_whole;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use crate::findings::shortened;
 use crate::{Finding, SceneError, Severity};
 
 /// Largest JSON file that is read, in bytes.
-pub const MAX_JSON_BYTES: u64 = 256 << 20;
+const MAX_JSON_BYTES: u64 = 256 << 20;
 
 /// Pretty JSON with a closing newline.
 pub fn to_text<T: Serialize>(value: &T) -> String {
@@ -98,12 +98,7 @@ fn separate<W: ?Sized + Write>(writer: &mut W, first: bool) -> io::Result<()> {
 
 /// Reads a file; what does not fit is an error with its JSON pointer, line and column.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
-    read_within(path, MAX_JSON_BYTES)
-}
-
-/// Reads a file of at most `most` bytes.
-pub fn read_within<T: DeserializeOwned>(path: &Path, most: u64) -> Result<T, SceneError> {
-    parse(path, &read_at_most(path, most).map_err(SceneError::io("read", path))?)
+    parse(path, &read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?)
 }
 
 /// Reads a file of the format `expected`. Another format is [`SceneError::Format`], whatever else differs from what this

@@ -10,8 +10,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use mateval_image::owner::Owner;
-use mateval_image::temporary;
+use mateval_image::store::{self, Owner};
 
 use crate::{SceneError, work_folder};
 
@@ -36,7 +35,7 @@ impl Lease {
     /// Takes the lease that the file `path` stands for. `what` is what it allows to change, as in "scene 'room'". Fails
     /// where another process holds it, or this one does already.
     pub fn take(path: &Path, what: &str) -> Result<Self, SceneError> {
-        temporary::abandoned_beside(path).iter().try_for_each(|left| work_folder::remove(left))?;
+        store::abandoned_beside(path).iter().try_for_each(|left| work_folder::remove(left))?;
         let claim = Claim::new(path)?;
         while !claim.put_at(path)? {
             claim.break_lost(path, what)?;
@@ -107,7 +106,7 @@ impl Claim {
     fn new(path: &Path) -> Result<Self, SceneError> {
         let folder = path.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
-        let file = temporary::beside(path).expect("a lease's file has a name");
+        let file = store::beside(path).expect("a lease's file has a name");
         // Two leases of one process differ too.
         let text = format!("{}\n{}\n", Owner::this_process(), file.display());
         // Made first, so that it removes its file where the disk is full.

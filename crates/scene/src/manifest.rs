@@ -1,15 +1,19 @@
 //! `MANIFEST.sha256`: a line `<sha256>  <path>` for each file, sorted by path, in the format of `sha256sum -c`.
+//!
+//! [`SceneHashes`] keeps the hashes of one scene's files in `.build`, so that the manifest is written without reading them
+//! again; [`change_scene`] lets one process at a time change a scene without hiding other changes.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
-use std::path::Path;
+use std::os::unix::fs::MetadataExt as _;
+use std::path::{Path, PathBuf};
 
-use mateval_image::store::write_whole;
-use mateval_image::temporary::{is_abandoned, is_temporary};
+use mateval_image::store::{is_abandoned, is_temporary, write_whole};
+use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use crate::layout::{COMPARE, DATASET, MANIFEST};
-use crate::{Finding, SceneError, Severity, work_folder};
+use crate::layout::{BuildFolder, COMPARE, DATASET, MANIFEST, SceneFolder, is_rendered};
+use crate::{Finding, SceneError, SceneId, Severity, json, work_folder};
 
 /// The code of a finding about a file that the manifest lists and the dataset lacks.
 pub const MISSING_FILE: &str = "missing_file";
@@ -48,7 +52,7 @@ pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
 }
 
 /// The files below the folder `below` of `root`, relative to `root` and sorted. Links to folders are not followed.
-pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, SceneError> {
+fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, SceneError> {
     let mut files = Vec::new();
     let mut folders = vec![below.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -69,7 +73,7 @@ pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, Scene
 }
 
 /// Removes the unfinished files and folders below `folder` whose processes are gone.
-pub(crate) fn remove_abandoned(folder: &Path) -> Result<(), SceneError> {
+fn remove_abandoned(folder: &Path) -> Result<(), SceneError> {
     remove_those(folder, is_abandoned)
 }
 
@@ -188,7 +192,7 @@ fn is_linked_folder(root: &Path, file: &str) -> bool {
 }
 
 /// Fails if a file that was found is a link to a folder.
-pub(crate) fn refuse_linked_folder(root: &Path, file: &str) -> Result<(), SceneError> {
+fn refuse_linked_folder(root: &Path, file: &str) -> Result<(), SceneError> {
     if !is_linked_folder(root, file) {
         return Ok(());
     }
@@ -200,15 +204,15 @@ fn is_inside(file: &str) -> bool {
     Path::new(file).components().all(|part| matches!(part, std::path::Component::Normal(_)))
 }
 
-pub(crate) fn missing_file(file: &str) -> Finding {
+fn missing_file(file: &str) -> Finding {
     fault(MISSING_FILE, file, String::new(), "listed in the manifest, but missing")
 }
 
-pub(crate) fn changed_file(file: &str, found: &str, expected: &str) -> Finding {
+fn changed_file(file: &str, found: &str, expected: &str) -> Finding {
     fault("changed_file", file, String::new(), &format!("SHA-256 is {found}, expected {expected}"))
 }
 
-pub(crate) fn unlisted_file(root: &Path, file: &str) -> Finding {
+fn unlisted_file(root: &Path, file: &str) -> Finding {
     if is_linked_folder(root, file) {
         let fault = fault("linked_folder", file, String::new(), LINKED_FOLDER);
         return Finding { action: NO_LINKED_FOLDER.to_owned(), ..fault };
@@ -225,6 +229,178 @@ fn fault(code: &str, file: &str, place: String, message: &str) -> Finding {
         message: message.to_owned(),
         action: "fetch or build the dataset again".to_owned(),
     }
+}
+
+/// The listed files of a scene.
+#[derive(Debug)]
+pub struct SceneHashes {
+    root: PathBuf,
+    scene: SceneId,
+    files: BTreeMap<String, Listed>,
+}
+
+/// A file as it was when it was hashed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Listed {
+    sha256: String,
+    /// None where the hash was taken from the manifest and the file not read yet.
+    stamp: Option<Stamp>,
+}
+
+/// Properties that differ after every change of a file: a program may set the time of a modification, but not that of
+/// the last change of the file's entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Stamp {
+    bytes: u64,
+    modified: (i64, i64),
+    changed: (i64, i64),
+}
+
+impl Stamp {
+    fn of(path: &Path) -> Option<Self> {
+        let found = std::fs::metadata(path).ok()?;
+        let (modified, changed) = ((found.mtime(), found.mtime_nsec()), (found.ctime(), found.ctime_nsec()));
+        Some(Self { bytes: found.len(), modified, changed })
+    }
+}
+
+impl SceneHashes {
+    /// The list of a scene. Of a scene that has not changed since the manifest was written, the manifest's hashes count.
+    /// A list that cannot be read counts as missing.
+    pub fn open(root: &Path, scene: &SceneId) -> Result<Self, SceneError> {
+        let build = BuildFolder::of(root);
+        let mut files: BTreeMap<String, Listed> = json::read(&build.hashes(scene)).unwrap_or_default();
+        if root.join(crate::layout::MANIFEST).is_file() && !build.changed().contains(scene) {
+            let folder = folder(scene);
+            let listed = entries(root)?.into_iter().filter(|entry| entry.file.starts_with(&folder));
+            let stamp = |file: &String, sha256: &String| {
+                files.get(file).filter(|listed| listed.sha256 == *sha256).and_then(|listed| listed.stamp)
+            };
+            let listed = listed.map(|entry| {
+                let stamp = stamp(&entry.file, &entry.sha256);
+                (entry.file, Listed { sha256: entry.sha256, stamp })
+            });
+            let listed: BTreeMap<String, Listed> = listed.collect();
+            // The manifest lists nothing of a scene that was left out.
+            if !listed.is_empty() {
+                files = listed;
+            }
+        }
+        Ok(Self { root: root.to_owned(), scene: scene.clone(), files })
+    }
+
+    /// An empty list, for a scene that is made new.
+    pub fn empty(root: &Path, scene: &SceneId) -> Self {
+        Self { root: root.to_owned(), scene: scene.clone(), files: BTreeMap::new() }
+    }
+
+    /// Compares the files with the list: each one that is missing, changed or not listed is a finding. Only those are
+    /// compared that `concerns` accepts by their paths in the dataset, and only those are read whose size or times are not
+    /// those of the list.
+    pub fn check(&mut self, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
+        let mut findings = Vec::new();
+        for (file, listed) in self.files.iter_mut().filter(|(file, _)| concerns(file)) {
+            let path = self.root.join(file);
+            let stamp = Stamp::of(&path);
+            if stamp.is_some() && stamp == listed.stamp {
+                continue;
+            }
+            match sha256_of_file(&path) {
+                Ok(found) if found == listed.sha256 => listed.stamp = stamp,
+                Ok(found) => findings.push(changed_file(file, &found, &listed.sha256)),
+                Err(_) if stamp.is_none() => findings.push(missing_file(file)),
+                Err(error) => return Err(error),
+            }
+        }
+        let unlisted = self.found()?.into_iter().filter(|file| concerns(file) && !self.files.contains_key(file));
+        findings.extend(unlisted.map(|file| unlisted_file(&self.root, &file)));
+        findings.sort();
+        Ok(findings.into_iter().map(with_advice).collect())
+    }
+
+    /// Lists the files as they are now, after `prep` wrote them, and keeps the list. Only those are read whose size or
+    /// times are not those of the list.
+    pub fn update(&mut self) -> Result<(), SceneError> {
+        let mut files = BTreeMap::new();
+        for file in self.found()? {
+            refuse_linked_folder(&self.root, &file)?;
+            let path = self.root.join(&file);
+            let stamp = Stamp::of(&path);
+            let known = self.files.get(&file).filter(|listed| stamp.is_some() && listed.stamp == stamp);
+            let listed = match known {
+                Some(listed) => listed.clone(),
+                None => Listed { sha256: sha256_of_file(&path)?, stamp },
+            };
+            files.insert(file, listed);
+        }
+        self.files = files;
+        self.keep()
+    }
+
+    /// Keeps the list, and notes that it counts from here on, and not the manifest: the scene is about to change.
+    pub fn note_change(&self) -> Result<(), SceneError> {
+        self.keep()?;
+        BuildFolder::of(&self.root).note_change(&self.scene)
+    }
+
+    fn keep(&self) -> Result<(), SceneError> {
+        let list = BuildFolder::of(&self.root).hashes(&self.scene);
+        let parent = list.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(parent).map_err(SceneError::io("make", parent))?;
+        // Without line breaks: nobody reads it, and a room has hundreds of files.
+        let text = serde_json::to_string(&self.files).expect("names, numbers and hashes become JSON");
+        Ok(write_whole(&list, text.as_bytes())?)
+    }
+
+    /// Paths in the dataset and hashes, sorted by path.
+    pub fn entries(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.files.iter().map(|(file, listed)| (file.as_str(), listed.sha256.as_str()))
+    }
+
+    /// The scene's files but unfinished ones; those that a killed process left are removed.
+    fn found(&self) -> Result<Vec<String>, SceneError> {
+        remove_abandoned(&self.root.join(folder(&self.scene)))?;
+        let files = list_below(&self.root, Path::new(&folder(&self.scene)))?;
+        Ok(files.into_iter().filter(|file| !file.split('/').any(is_temporary)).collect())
+    }
+}
+
+/// The finding with the command that helps.
+fn with_advice(finding: Finding) -> Finding {
+    let action = match (is_rendered(&finding.file), finding.file.contains("/renders/scorer/")) {
+        (true, true) => {
+            "run `prep render --only scorer` for this scene: it was cut off, or the file was changed by hand"
+        }
+        (true, false) => "run `prep render` again for this scene: it was cut off, or the file was changed by hand",
+        (false, _) => "make the scene again by `prep build --scene SCENE --force`: the file was changed by hand",
+    };
+    Finding { action: action.to_owned(), ..finding }
+}
+
+fn folder(scene: &SceneId) -> String {
+    format!("scenes/{scene}/")
+}
+
+/// Lets `work` write files of the scene, while no other process may, and lists all its files anew. `is_ours` accepts those
+/// that `work` may write, by their paths in the dataset. Fails where any other file is not the one that is listed, since a
+/// later manifest would list it as it is.
+pub fn change_scene<T, E: From<SceneError>>(
+    root: &Path,
+    scene: &SceneId,
+    is_ours: impl Fn(&str) -> bool,
+    work: impl FnOnce() -> Result<T, E>,
+) -> Result<T, E> {
+    let _lease = BuildFolder::of(root).lease_of_scene(scene)?;
+    remove_unfinished(SceneFolder::of(root, scene).path())?;
+    let mut hashes = SceneHashes::open(root, scene)?;
+    let findings = hashes.check(|path| !is_ours(path))?;
+    if !findings.is_empty() {
+        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+    }
+    hashes.note_change()?;
+    let done = work()?;
+    hashes.update()?;
+    Ok(done)
 }
 
 #[cfg(test)]
@@ -248,8 +424,8 @@ mod tests {
         }
         write(root).unwrap();
         assert!(check(root).unwrap().is_empty());
-        let live = mateval_image::temporary::beside(&root.join("scenes/e")).unwrap();
-        let own = mateval_image::owner::Owner::this_process();
+        let live = mateval_image::store::beside(&root.join("scenes/e")).unwrap();
+        let own = mateval_image::store::Owner::this_process();
         let dead = root.join(format!("scenes/.e.{}-{}-1-0.partial", own.host, own.process));
         for path in [&live, &dead] {
             std::fs::write(path, "half").unwrap();
@@ -279,5 +455,72 @@ mod tests {
         assert_eq!((found[0].code.as_str(), found[0].file.as_str()), ("linked_folder", "scenes/b"));
         let error = write(root).unwrap_err().to_string();
         assert!(error.contains("scenes/b") && error.contains("a link to a folder"), "{error}");
+    }
+
+    fn scene_with(files: &[(&str, &str)]) -> (tempfile::TempDir, SceneId) {
+        let root = tempfile::tempdir().unwrap();
+        for (file, text) in files {
+            let path = root.path().join("scenes/room").join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        }
+        (root, SceneId::new("room").unwrap())
+    }
+
+    fn codes(found: Vec<Finding>) -> Vec<String> {
+        found.into_iter().map(|finding| format!("{} {}", finding.code, finding.file)).collect()
+    }
+
+    #[test]
+    fn changes_of_every_kind_are_found_and_nothing_else() {
+        let (root, id) = scene_with(&[("a", "1"), ("b", "2"), ("deep/c", "3"), ("d", "4")]);
+        let mut hashes = SceneHashes::empty(root.path(), &id);
+        hashes.update().unwrap();
+        let place = |file: &str| root.path().join("scenes/room").join(file);
+        let unfinished = mateval_image::store::beside(&place("a")).unwrap();
+        std::fs::write(&unfinished, "half").unwrap();
+        assert_eq!(codes(SceneHashes::open(root.path(), &id).unwrap().check(|_| true).unwrap()), [""; 0]);
+        // Written again with the same bytes: another time, and the same file.
+        std::fs::write(place("d"), "4").unwrap();
+        // Of the same size and time, as `cp --preserve` makes it.
+        let time = std::fs::metadata(place("a")).unwrap().modified().unwrap();
+        std::fs::write(place("a"), "x").unwrap();
+        std::fs::File::options().write(true).open(place("a")).unwrap().set_modified(time).unwrap();
+        std::fs::remove_file(place("b")).unwrap();
+        std::fs::write(place("deep/e"), "5").unwrap();
+        let mut hashes = SceneHashes::open(root.path(), &id).unwrap();
+        let all = ["changed_file scenes/room/a", "missing_file scenes/room/b", "unlisted_file scenes/room/deep/e"];
+        let mut found = codes(hashes.check(|_| true).unwrap());
+        found.sort();
+        assert_eq!(found, all);
+        assert_eq!(codes(hashes.check(|file| file.ends_with("/b")).unwrap()), all[1..2]);
+        hashes.update().unwrap();
+        assert_eq!(codes(SceneHashes::open(root.path(), &id).unwrap().check(|_| true).unwrap()), [""; 0]);
+        assert!(unfinished.exists(), "its owner lives");
+    }
+
+    /// The list of a scene that the manifest describes too must not hide another dataset that was unpacked over this one.
+    #[test]
+    fn the_manifest_counts_where_nothing_was_changed_apart() {
+        let (root, id) = scene_with(&[("a", "1")]);
+        let mut hashes = SceneHashes::empty(root.path(), &id);
+        hashes.update().unwrap();
+        let line = |text: &str| format!("{}  scenes/room/a\n", sha256_of_bytes(text.as_bytes()));
+        let check = || SceneHashes::open(root.path(), &id).unwrap().check(|_| true).unwrap().len();
+        std::fs::write(root.path().join("MANIFEST.sha256"), line("1")).unwrap();
+        assert_eq!(check(), 0);
+        std::fs::write(root.path().join("MANIFEST.sha256"), line("2")).unwrap();
+        assert_eq!(check(), 1);
+        BuildFolder::of(root.path()).note_change(&id).unwrap();
+        assert_eq!(check(), 0);
+    }
+
+    #[test]
+    fn a_damaged_list_counts_as_missing() {
+        let (root, id) = scene_with(&[("a", "1")]);
+        SceneHashes::empty(root.path(), &id).update().unwrap();
+        std::fs::write(BuildFolder::of(root.path()).hashes(&id), "{").unwrap();
+        let found = codes(SceneHashes::open(root.path(), &id).unwrap().check(|_| true).unwrap());
+        assert_eq!(found, ["unlisted_file scenes/room/a"]);
     }
 }

@@ -1,9 +1,14 @@
-//! Materials as parameters, as their sources state them. How they scatter light is the tracer's `Bsdf`.
+//! Materials as parameters, as their sources state them, and the classes of material from which a source's reader draws
+//! roughness and metallic. How materials scatter light is the tracer's `Bsdf`.
+
+use std::fmt;
 
 use glam::Vec2;
 use mateval_image::Texture;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::ids::PartId;
 
 /// An index of [`crate::reference::ReferenceScene::textures`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -54,7 +59,6 @@ impl Default for UvTransform {
 }
 
 impl UvTransform {
-    /// The texture's uv.
     pub fn apply(&self, uv: Vec2) -> Vec2 {
         let row = |r: [f32; 3]| r[0] * uv.x + r[1] * uv.y + r[2];
         Vec2::new(row(self.0[0]), row(self.0[1]))
@@ -259,13 +263,9 @@ pub enum MaterialParameter {
 /// reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StatedParameters {
-    /// The base colour.
     pub base_color: bool,
-    /// The roughness.
     pub roughness: bool,
-    /// The metallic.
     pub metallic: bool,
-    /// The emission.
     pub emission: bool,
 }
 
@@ -292,7 +292,6 @@ impl StatedParameters {
 /// A texture of a material and how it is looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lookup {
-    /// The texture.
     pub texture: TextureIndex,
     /// 0 red, 1 green, 2 blue; 0 for colours.
     pub channel: usize,
@@ -492,6 +491,89 @@ impl ConductorIor {
     }
 }
 
+/// A class of material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MaterialClass {
+    /// Clear or tinted glass, as the glossy surface of a dielectric.
+    Glass,
+    /// Bare metal.
+    Metal,
+    /// Polished stone.
+    Stone,
+    /// Glazed tiles and ceramics.
+    Tile,
+    /// Leather with a gloss.
+    SmoothLeather,
+    /// Other leather.
+    Leather,
+    /// Suede and velvet.
+    Suede,
+    /// Bamboo and rattan.
+    Wicker,
+    /// Coarse cloth, wool and carpets.
+    CoarseCloth,
+    /// Cotton and other cloth.
+    Cloth,
+    /// Wall paint, plaster and wallpaper.
+    Paint,
+    /// Painted or lacquered woodwork.
+    Lacquer,
+    /// Boards with faces of melamine.
+    Board,
+    /// Varnished or oiled wood.
+    Wood,
+    /// Plastic.
+    Plastic,
+}
+
+impl MaterialClass {
+    pub const ALL: [Self; 15] = [
+        Self::Glass,
+        Self::Metal,
+        Self::Stone,
+        Self::Tile,
+        Self::SmoothLeather,
+        Self::Leather,
+        Self::Suede,
+        Self::Wicker,
+        Self::CoarseCloth,
+        Self::Cloth,
+        Self::Paint,
+        Self::Lacquer,
+        Self::Board,
+        Self::Wood,
+        Self::Plastic,
+    ];
+}
+
+/// The word that JSON files use.
+impl fmt::Display for MaterialClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
+}
+
+/// `ground_truth/material_classes.json`: the class of each of the source's own parts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialClassesFile {
+    /// Always `mateval/3`.
+    pub format: String,
+    /// In the order of `parts` of `scene.json`.
+    pub parts: Vec<ClassifiedPart>,
+}
+
+/// The class of a part.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClassifiedPart {
+    /// The part.
+    pub part: PartId,
+    /// Its class; null where its triangles belong to several.
+    pub class: Option<MaterialClass>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -504,5 +586,13 @@ mod tests {
             assert!((found - expected).abs() < 1e-3, "{found} {expected}");
         }
         assert_eq!(ConductorIor::PerfectMirror.reflectance_at_normal(), [1.0; 3]);
+    }
+
+    #[test]
+    fn a_class_prints_as_in_json() {
+        for class in MaterialClass::ALL {
+            assert_eq!(serde_json::to_value(class).unwrap(), class.to_string());
+        }
+        assert_eq!(MaterialClass::SmoothLeather.to_string(), "smooth_leather");
     }
 }

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_image::file_kind::{hint, mistaken_for, without_mark};
+use mateval_image::limits::{hint, mistaken_for, without_mark};
 
 use crate::TriangleMesh;
 use crate::findings::shortened;
@@ -42,22 +42,17 @@ pub enum ObjFault {
     TooLarge(ObjLimits),
     /// A face of one or two corners.
     #[error("expected a face of 3 or more corners, found {found}")]
-    TooFewCorners {
-        /// Its corners.
-        found: usize,
-    },
+    TooFewCorners { found: usize },
     /// A word of a face that is not an index.
     #[error("expected an index of a {what}, found '{}'", shortened(found))]
     NotAnIndex {
         /// As in `position`.
         what: &'static str,
-        /// The word.
         found: String,
     },
     /// An index of something that the file has not defined before.
     #[error("the index {index} of a {what} is out of range: {count} came before it")]
     IndexOutOfRange {
-        /// The index.
         index: i64,
         /// As in `position`.
         what: &'static str,
@@ -66,22 +61,15 @@ pub enum ObjFault {
     },
     /// A corner of more than three parts.
     #[error("expected position/uv/normal, found '{}'", shortened(found))]
-    NotACorner {
-        /// The corner.
-        found: String,
-    },
+    NotACorner { found: String },
     /// A colour that has neither one number nor three.
     #[error("Kd: expected one number or three, found {found}")]
-    NotAColor {
-        /// How many it has.
-        found: usize,
-    },
+    NotAColor { found: usize },
     /// A property of a material that is not a finite number.
     #[error("{key} of '{}': expected finite numbers", shortened(material))]
     NotFinite {
         /// As in `Pr`.
         key: &'static str,
-        /// The material's name.
         material: String,
     },
     /// It is a file of another kind.
@@ -104,7 +92,6 @@ impl From<ObjFault> for ObjError {
 /// A run of triangles of one object or group.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ObjGroup {
-    /// Its name.
     pub name: String,
     /// The name after `usemtl`; none without one, and under [`Materials::Ignored`].
     pub material: Option<String>,

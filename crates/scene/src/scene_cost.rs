@@ -4,13 +4,13 @@
 //! or failed is not counted.
 
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::build_folder::BuildFolder;
-use crate::{RendererId, SceneError, SceneId, json, process_cpu, work_folder};
+use crate::layout::BuildFolder;
+use crate::{RendererId, SceneError, SceneId, json, work_folder};
 
 /// The format of this version of the file.
 const COST_FORMAT: &str = "mateval-cost/1";
@@ -55,7 +55,6 @@ struct CostFile {
 /// The work whose cost is recorded.
 #[derive(Clone, Copy, Debug)]
 pub struct TimedStep<'a> {
-    /// The step.
     pub step: Step,
     /// The renderer of the step `render`.
     pub renderer: Option<&'a RendererId>,
@@ -86,9 +85,9 @@ pub fn timed<T, E: From<SceneError>>(
     work: impl FnOnce() -> Result<T, E>,
 ) -> Result<T, E> {
     let mut steps = read(root, scene)?;
-    let (start, cpu) = (Instant::now(), process_cpu::used().filter(|_| timed.is_alone));
+    let (start, cpu) = (Instant::now(), processor_time().filter(|_| timed.is_alone));
     let done = work()?;
-    let cpu = cpu.zip(process_cpu::used()).map(|(before, after)| after.saturating_sub(before));
+    let cpu = cpu.zip(processor_time()).map(|(before, after)| after.saturating_sub(before));
     let run = StepCost {
         step: timed.step,
         renderer: timed.renderer.cloned(),
@@ -122,6 +121,26 @@ fn add(steps: &mut Vec<StepCost>, run: StepCost) {
         }
         None => steps.push(run),
     }
+}
+
+/// Where Linux states it; see proc(5).
+const STAT: &str = "/proc/self/stat";
+
+/// The places of `utime`, `stime`, `cutime` and `cstime` behind the program's name.
+const TIMES: std::ops::Range<usize> = 11..15;
+
+/// The processor time used so far, of all threads and of child processes that have ended; none where the system does not
+/// state it.
+pub fn processor_time() -> Option<Duration> {
+    let ticks = ticks(&std::fs::read_to_string(STAT).ok()?)?;
+    Some(Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second() as f64))
+}
+
+/// The sum of the four times, in clock ticks. The program's name is in parentheses and may contain any character.
+fn ticks(stat: &str) -> Option<u64> {
+    let (_, rest) = stat.rsplit_once(") ")?;
+    let fields: Vec<&str> = rest.split_whitespace().collect();
+    fields.get(TIMES)?.iter().map(|field| field.parse::<u64>().ok()).sum()
 }
 
 #[cfg(test)]
@@ -170,5 +189,19 @@ mod tests {
         });
         assert!(failed.is_err() && !worked);
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "{}");
+    }
+
+    #[test]
+    fn four_times_are_summed_whatever_the_name() {
+        let stat = "12 (a) b) R 1 2 3 4 5 6 7 8 9 10 100 20 3000 4 0 0";
+        assert_eq!(ticks(stat), Some(3124));
+        assert_eq!(ticks("12 (a) R 1 2 3"), None);
+        assert_eq!(ticks(&stat.replace("3000", "x")), None);
+    }
+
+    #[test]
+    fn time_passes() {
+        let before = processor_time().unwrap();
+        while processor_time().unwrap() == before {}
     }
 }

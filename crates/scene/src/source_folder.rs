@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use mateval_image::file_kind::{hint, is_lfs_pointer};
+use mateval_image::limits::{hint, is_lfs_pointer};
 
 use crate::findings::shortened;
 use crate::manifest::sha256_of_bytes;
@@ -152,7 +152,6 @@ impl SourceFolder {
         self.hashes.get(relative).cloned()
     }
 
-    /// Its path.
     pub fn root(&self) -> &Path {
         &self.root
     }

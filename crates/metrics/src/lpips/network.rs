@@ -1,15 +1,199 @@
-//! The features of a picture: the normalised responses of a network's five stages.
+//! The two networks, their weights as `mateval fetch lpips` writes them, and the features of a picture: the normalised
+//! responses of a network's five stages.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 use rayon::prelude::*;
+use safetensors::{Dtype, SafeTensors};
+use sha2::{Digest, Sha256};
 
-use super::net::{Net, Network, Stage};
-use super::pool::Pool;
-use super::reach::{PixelSet, Window};
-use super::tensor::Tensor;
+use super::tensor::{Convolution, PixelSet, Pool, Shape, Tensor, Window};
 use crate::MetricError;
-use crate::error::Size;
-use crate::pixel::{check_finite, size_of};
+use crate::pixel::{Size, check_finite, size_of};
+
+/// A network whose features LPIPS compares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Net {
+    /// AlexNet's five convolutions; fast, and recommended by the LPIPS authors for scoring.
+    Alex,
+    /// VGG-16's thirteen convolutions; about twenty times the work.
+    Vgg,
+}
+
+impl Net {
+    /// The metric's key in results.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Alex => "lpips_alex",
+            Self::Vgg => "lpips_vgg",
+        }
+    }
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Alex => "alex",
+            Self::Vgg => "vgg",
+        }
+    }
+
+    /// Name of the weights file.
+    pub const fn file_name(self) -> &'static str {
+        match self {
+            Self::Alex => "lpips-alex-v0.1.safetensors",
+            Self::Vgg => "lpips-vgg-v0.1.safetensors",
+        }
+    }
+
+    /// SHA-256 of the weights file, in lower-case hexadecimal.
+    pub const fn expected_sha256(self) -> &'static str {
+        match self {
+            Self::Alex => "b24653d691930ef38ebb65d7139a65227e482b1abcf5709f4805fe743fecb6c1",
+            Self::Vgg => "5bd07b60a36a4a0588774f8b9e810e3ea3225925c30a6a73f171bb3932227524",
+        }
+    }
+
+    /// Least width and height of a picture in pixels. A smaller one would leave a stage without a pixel.
+    pub const fn least_side(self) -> usize {
+        match self {
+            Self::Alex => 31,
+            Self::Vgg => 16,
+        }
+    }
+
+    /// The five stages, in order.
+    pub(crate) fn stages(self) -> Vec<StageShape> {
+        match self {
+            Self::Alex => alex_stages(),
+            Self::Vgg => vgg_stages(),
+        }
+    }
+}
+
+/// The layers of a stage: an optional pool, then convolutions.
+#[derive(Debug)]
+pub(crate) struct StageShape {
+    pub(crate) pool: Option<Pool>,
+    pub(crate) convolutions: Vec<Shape>,
+}
+
+/// AlexNet (Krizhevsky) as in torchvision, up to the last rectifier before its third pool.
+fn alex_stages() -> Vec<StageShape> {
+    let pool = Some(Pool { window: 3, stride: 2 });
+    let stage = |pool, kernel, stride, padding, inputs, outputs| StageShape {
+        pool,
+        convolutions: vec![Shape { kernel, stride, padding, inputs, outputs }],
+    };
+    vec![
+        stage(None, 11, 4, 2, 3, 64),
+        stage(pool, 5, 1, 2, 64, 192),
+        stage(pool, 3, 1, 1, 192, 384),
+        stage(None, 3, 1, 1, 384, 256),
+        stage(None, 3, 1, 1, 256, 256),
+    ]
+}
+
+/// VGG configuration D (Simonyan and Zisserman), up to the last rectifier before its fifth pool.
+fn vgg_stages() -> Vec<StageShape> {
+    let stages: [(usize, usize, usize); 5] = [(2, 3, 64), (2, 64, 128), (3, 128, 256), (3, 256, 512), (3, 512, 512)];
+    let shape = |inputs, outputs| Shape { kernel: 3, stride: 1, padding: 1, inputs, outputs };
+    let stage = |(index, &(count, inputs, outputs)): (usize, &(usize, usize, usize))| StageShape {
+        pool: (index > 0).then_some(Pool { window: 2, stride: 2 }),
+        convolutions: (0..count).map(|i| shape(if i == 0 { inputs } else { outputs }, outputs)).collect(),
+    };
+    stages.iter().enumerate().map(stage).collect()
+}
+
+/// A stage with its weights.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    pub(crate) pool: Option<Pool>,
+    pub(crate) convolutions: Vec<Convolution>,
+    /// The weight of each channel's squared difference.
+    pub(crate) linear: Vec<f32>,
+}
+
+/// Stages with their weights.
+#[derive(Debug)]
+pub(crate) struct Network {
+    pub(crate) stages: Vec<Stage>,
+}
+
+impl Network {
+    /// Whether every stage has at least one pixel for a picture of this width or height.
+    pub(crate) fn fits(&self, side: usize) -> bool {
+        let mut side = Some(side);
+        for stage in &self.stages {
+            side = stage.pool.map_or(side, |pool| side.and_then(|side| pool.output_side(side)));
+            for convolution in &stage.convolutions {
+                side = side.and_then(|side| convolution.shape.output_side(side));
+            }
+        }
+        side.is_some()
+    }
+}
+
+/// Larger than either file.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// The network and the file's SHA-256. Fails unless the hash is the expected one.
+pub(crate) fn load(net: Net, path: &Path) -> Result<(Network, String), MetricError> {
+    let bytes = read_capped(path).map_err(|source| MetricError::WeightsIo { path: path.to_owned(), source })?;
+    let found: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    if found != net.expected_sha256() {
+        return Err(MetricError::WeightsHash { path: path.to_owned(), expected: net.expected_sha256(), found });
+    }
+    Ok((parse(&net.stages(), &bytes)?, found))
+}
+
+/// The file's bytes, at most one more than [`MAX_BYTES`], so that a larger file fails the check of its hash.
+fn read_capped(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The network with these stages, from the bytes of a safetensors file.
+fn parse(shapes: &[StageShape], bytes: &[u8]) -> Result<Network, MetricError> {
+    let file = SafeTensors::deserialize(bytes).map_err(|error| malformed(error.to_string()))?;
+    let mut number = 0;
+    let mut stages = Vec::with_capacity(shapes.len());
+    for (index, shape) in shapes.iter().enumerate() {
+        let mut convolutions = Vec::with_capacity(shape.convolutions.len());
+        for &shape in &shape.convolutions {
+            number += 1;
+            convolutions.push(convolution(&file, number, shape)?);
+        }
+        let channels = shape.convolutions.last().map_or(0, |last| last.outputs);
+        let linear = floats(&file, &format!("lin{}.weight", index + 1), &[channels])?;
+        stages.push(Stage { pool: shape.pool, convolutions, linear });
+    }
+    Ok(Network { stages })
+}
+
+fn convolution(file: &SafeTensors<'_>, number: usize, shape: Shape) -> Result<Convolution, MetricError> {
+    let kernel = [shape.outputs, shape.inputs, shape.kernel, shape.kernel];
+    let weights = floats(file, &format!("conv{number}.weight"), &kernel)?;
+    let bias = floats(file, &format!("conv{number}.bias"), &[shape.outputs])?;
+    Ok(Convolution::new(shape, &weights, bias))
+}
+
+/// The tensor with this name. Fails unless it is `f32` and has this shape.
+fn floats(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, MetricError> {
+    let tensor = file.tensor(name).map_err(|error| malformed(format!("'{name}': {error}")))?;
+    if tensor.dtype() != Dtype::F32 || tensor.shape() != shape {
+        let (dtype, found) = (tensor.dtype(), tensor.shape());
+        return Err(malformed(format!("'{name}' is {dtype:?} {found:?}; expected F32 {shape:?}")));
+    }
+    let (values, _) = tensor.data().as_chunks::<4>();
+    Ok(values.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
+}
+
+fn malformed(reason: String) -> MetricError {
+    MetricError::WeightsMalformed { reason }
+}
 
 /// LPIPS' scaling layer, for a picture in -1..1: `SHIFT` is subtracted from each channel, the result is divided by
 /// `SCALE`. They are ImageNet's mean and standard deviation, converted from 0..1 to -1..1.
@@ -46,12 +230,10 @@ impl Features {
         self.net
     }
 
-    /// The picture's width.
     pub fn width(&self) -> usize {
         self.size.0
     }
 
-    /// The picture's height.
     pub fn height(&self) -> usize {
         self.size.1
     }
@@ -263,4 +445,75 @@ pub(crate) fn filled_input(picture: &Picture<SrgbRgb>, base: &Features, mask: &M
         values.copy_from_slice(&scaled_pixel(*pixel));
     }
     input
+}
+
+#[cfg(test)]
+mod tests {
+    use safetensors::tensor::TensorView;
+
+    use super::*;
+
+    fn tiny_shapes() -> Vec<StageShape> {
+        let shape = Shape { kernel: 2, stride: 1, padding: 0, inputs: 1, outputs: 2 };
+        vec![StageShape { pool: None, convolutions: vec![shape] }]
+    }
+
+    fn file(tensors: &[(&str, Dtype, Vec<usize>)]) -> Vec<u8> {
+        let zeros = [0_u8; 256];
+        let views = tensors.iter().map(|(name, dtype, shape)| {
+            let bytes = shape.iter().product::<usize>() * if *dtype == Dtype::F64 { 8 } else { 4 };
+            (*name, TensorView::new(*dtype, shape.clone(), &zeros[..bytes]).unwrap())
+        });
+        safetensors::serialize(views, None).unwrap()
+    }
+
+    fn good() -> Vec<(&'static str, Dtype, Vec<usize>)> {
+        let kernel = ("conv1.weight", Dtype::F32, vec![2, 1, 2, 2]);
+        vec![kernel, ("conv1.bias", Dtype::F32, vec![2]), ("lin1.weight", Dtype::F32, vec![2])]
+    }
+
+    #[test]
+    fn a_file_that_fits_is_read_and_others_are_named() {
+        assert_eq!(parse(&tiny_shapes(), &file(&good())).unwrap().stages[0].linear, [0.0, 0.0]);
+        for (index, name) in ["conv1.weight", "conv1.bias", "lin1.weight"].into_iter().enumerate() {
+            let (mut missing, mut other_shape, mut doubles) = (good(), good(), good());
+            missing.remove(index);
+            other_shape[index].2.push(1);
+            doubles[index].1 = Dtype::F64;
+            for tensors in [missing, other_shape, doubles] {
+                let error = parse(&tiny_shapes(), &file(&tensors)).unwrap_err();
+                assert!(matches!(&error, MetricError::WeightsMalformed { reason } if reason.contains(name)), "{error}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_truncated_file_is_malformed_at_every_length() {
+        let whole = file(&good());
+        for length in 0..whole.len() {
+            let result = parse(&tiny_shapes(), &whole[..length]);
+            assert!(matches!(result, Err(MetricError::WeightsMalformed { .. })), "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn a_missing_and_another_file_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("weights.safetensors");
+        let error = load(Net::Alex, &path).unwrap_err();
+        assert!(matches!(error, MetricError::WeightsIo { .. }));
+        std::fs::write(&path, file(&good())).unwrap();
+        assert!(matches!(load(Net::Alex, &path), Err(MetricError::WeightsHash { .. })));
+    }
+
+    /// The tool that writes the files and the code that reads them agree on names and hashes.
+    #[test]
+    fn the_tool_has_the_same_names_and_hashes() {
+        let tool = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cli/src/fetch/lpips_weights.py");
+        let tool = std::fs::read_to_string(tool).unwrap();
+        for net in [Net::Alex, Net::Vgg] {
+            assert!(tool.contains(&format!("\"{}\"", net.file_name())));
+            assert!(tool.contains(&format!("\"{}\"", net.expected_sha256())));
+        }
+    }
 }
