@@ -5,7 +5,7 @@ use std::path::Path;
 use mateval_scene::Camera;
 use mateval_scene::reference::ReferenceScene;
 use mateval_sources::bitterli::{self, Limits};
-use mateval_testkit::data::shared_data;
+use mateval_testkit::shared_data;
 
 use super::mitsuba::{Case, all_agree};
 use mateval_testkit::bench_scene;

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use super::command::{Run, baseline, build, mateval, render, run, score, verify};
 use super::sample::{manifest, write_source};
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// The smallest scenes, since each test makes them many times.
 const TINY: &str = "resolution = [32, 24]\natlas_size = 64";

@@ -7,11 +7,11 @@ use std::process::Command;
 use std::sync::{LazyLock, Mutex, MutexGuard};
 
 use mateval_image::{LinearRgb, Picture, exr_io, png_io};
-use mateval_testkit::data::report_missing;
+use mateval_testkit::report_missing;
 
 use super::command::{Run, build, mateval, render, run, verify};
 use super::sample::{copied_dataset, files_below, json, manifest, write_source};
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// One view of the sample's room: each render takes seconds.
 const TINY: &str = "resolution = [64, 48]\natlas_size = 64\nviews = [{ id = \"left\", x_deg = 0, y_deg = 5 }]";

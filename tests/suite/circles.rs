@@ -222,7 +222,7 @@ fn no_files_import_each_other_in_a_circle() {
         let name = folder.file_name().unwrap().to_string_lossy().into_owned();
         found.extend(circles(&edges(&files)).into_iter().map(|circle| format!("{name}: {circle}")));
     }
-    assert!(seen > 350, "only {seen} files seen");
+    assert!(seen > 250, "only {seen} files seen");
     assert_eq!(found, Vec::<String>::new(), "{} files lie on circles", found.len());
 }
 

@@ -16,14 +16,14 @@ use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{ColorInput, MaterialModel};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_noise::RenderNoise;
-use mateval_scene::{RendererId, SceneId, reference_io};
+use mateval_scene::render_file::RenderNoise;
+use mateval_scene::{RendererId, SceneId, reference};
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
 use super::command::{mateval, run};
 use super::planted::{rehash, roll};
 use super::sample::{dataset, files_below, own_materials};
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// Samples a pixel of each half, theirs and ours. At 96x72 pixels, three standard errors of a tile are then two to four
 /// times the bound of 1 %, and those of a picture's mean are 0.5 to 0.8 % (under the lamp alone 1.5 to 2.2 %). The
@@ -58,7 +58,7 @@ fn own_copy(lambert: bool) -> tempfile::TempDir {
     let copy = tempfile::tempdir().unwrap();
     copy_folder(own_materials(), copy.path());
     if lambert {
-        let mut scene = reference_io::read(&room(copy.path())).unwrap();
+        let mut scene = reference::read(&room(copy.path())).unwrap();
         let textures = scene.texture_list();
         for material in &mut scene.materials {
             let flat = material.appearance(&textures, Default::default()).map_or([0.5; 3], |seen| seen.base_color);
@@ -69,7 +69,7 @@ fn own_copy(lambert: bool) -> tempfile::TempDir {
             };
             material.model = MaterialModel::Diffuse { reflectance, alpha: None };
         }
-        reference_io::write(&room(copy.path()), &scene).unwrap();
+        reference::write(&room(copy.path()), &scene).unwrap();
         rehash(copy.path());
     }
     copy
@@ -147,7 +147,7 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
 
 fn with_twin(name: &str, lambert: bool) -> PathBuf {
     let copy = own_copy(lambert);
-    let scene = reference_io::read(&room(copy.path())).unwrap();
+    let scene = reference::read(&room(copy.path())).unwrap();
     write_twin(copy.path(), scene, &views(copy.path()), SAMPLES);
     let kept = kept_folder(name);
     copy_folder(copy.path(), &kept);
@@ -234,7 +234,7 @@ fn check_page(out: &Path, file: &CompareFile) {
     assert_eq!(sorted, pictures);
     // Four pictures of each light; of geometry, three of each of five.
     assert_eq!(shown.len(), 5 * (4 * 4 + 5 * 3));
-    assert!(!html.contains("http") && html.contains(&mateval_audit::compare::text::verdict(file)));
+    assert!(!html.contains("http") && html.contains(&mateval_audit::compare::report::verdict(file)));
 }
 
 /// The sample's own materials: tiles with plastic and glass do not decide; in the others the lamp is too noisy, which
@@ -277,7 +277,7 @@ fn other_pictures_are_found() {
     let copy = copied(&LAMBERT);
     let (dataset, views) = (copy.path(), views(&LAMBERT));
     // `input`: the textures of the materials are mirrored.
-    write_twin(dataset, mirrored(reference_io::read(&room(dataset)).unwrap()), &views[..1], SAMPLES);
+    write_twin(dataset, mirrored(reference::read(&room(dataset)).unwrap()), &views[..1], SAMPLES);
     // `up_left` and `up_right` are swapped.
     let [left, right] = ["up_left", "up_right"].map(|view| their_folder(dataset, view));
     let aside = left.with_file_name("aside");
@@ -288,7 +288,7 @@ fn other_pictures_are_found() {
     let mut rolled = serde_json::to_value(&views[3]).unwrap();
     roll(&mut rolled, 1.0);
     let rolled: View = serde_json::from_value(rolled).unwrap();
-    write_twin(dataset, reference_io::read(&room(dataset)).unwrap(), &[rolled], SAMPLES);
+    write_twin(dataset, reference::read(&room(dataset)).unwrap(), &[rolled], SAMPLES);
     // `down_right`: a tone curve like Filmic's; the groups are unchanged.
     for file in ["rgb_a.exr", "rgb_b.exr", "rgb.exr"] {
         edit_light(dataset, "down_right", file, |_, LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * 1.1 / (v + 0.3))));

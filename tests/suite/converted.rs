@@ -4,13 +4,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_eval::light::true_maps::TruthMaterial;
+use mateval_eval::truth::true_material;
 use mateval_image::{LinearRgb, Picture};
 use mateval_prep::conversion::is_scored_model;
 use mateval_scene::dataset::{SceneFile, TrueMaterials};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{ConductorIor, MaterialModel, PrincipledFlavour};
-use mateval_scene::{SceneId, glb, reference_io};
+use mateval_scene::{SceneId, glb, reference};
 use mateval_tracer::{Coat, LightGroups, Lighting, RenderSettings, Repaint, World, render_repainted, render_views};
 use serde_json::Value;
 
@@ -18,7 +18,7 @@ use super::blender::blender;
 use super::command::{baseline, build, mateval, render, run, score};
 use super::planted::{Room, rehash};
 use super::sample::{copied_dataset, dataset, json, unrendered, write_source};
-use mateval_testkit::kept_folder::copy_folder;
+use mateval_testkit::copy_folder;
 
 fn room(dataset: &Path) -> SceneFolder {
     SceneFolder::of(dataset, &SceneId::new("room").unwrap())
@@ -46,7 +46,7 @@ fn off(found: &Picture<LinearRgb>, expected: &Picture<LinearRgb>) -> f64 {
 fn the_maps_describe_a_surface_completely() {
     let folder = room(dataset());
     let scene = scene_file(dataset());
-    let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
+    let world = World::new(Arc::new(reference::read(&folder).unwrap())).unwrap();
     assert_eq!(scene.materials, TrueMaterials::Converted);
     let materials = &world.scene().materials;
     assert!(materials.iter().all(is_scored_model));
@@ -55,7 +55,7 @@ fn the_maps_describe_a_surface_completely() {
     let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
     let coat = |instance: &mateval_scene::dataset::Instance| {
         let size = instance.atlas.as_ref()?.size as usize;
-        let truth = TruthMaterial::read(&folder, &instance.id, size).unwrap();
+        let truth = true_material(&folder, &instance.id, size).unwrap();
         Some(Coat { base_colors: vec![truth.base_color], roughness: truth.roughness, metallic: truth.metallic })
     };
     let coats = scene.instances.iter().map(coat).collect();
@@ -73,7 +73,7 @@ fn the_maps_describe_a_surface_completely() {
     let (painted, true_picture) = (painted[0].views[0].halves[0].basis.sum(), rendered(&world));
     let found = off(&painted, &true_picture);
 
-    let source = reference_io::read_source_materials(&folder, materials.len()).unwrap().unwrap();
+    let source = reference::read_source_materials(&folder, materials.len()).unwrap().unwrap();
     let own = World::sharing(Arc::new(source.in_scene(world.scene())), world.accel().clone()).unwrap();
     assert!(!own.scene().materials.iter().all(is_scored_model));
     let twin = off(&rendered(&own), &true_picture);
@@ -91,12 +91,12 @@ fn a_recipe_may_keep_the_sources_materials() {
     let dataset = folder.path().join("dataset");
     run(&mut build(&recipe, &dataset)).ends_with(0);
     assert_eq!(scene_file(&dataset).materials, TrueMaterials::Source);
-    let scene = reference_io::read(&room(&dataset)).unwrap();
+    let scene = reference::read(&room(&dataset)).unwrap();
     assert!(scene.materials.iter().any(|material| matches!(material.model, MaterialModel::Plastic { .. })));
-    assert_eq!(reference_io::read_source_materials(&room(&dataset), scene.materials.len()).unwrap(), None);
+    assert_eq!(reference::read_source_materials(&room(&dataset), scene.materials.len()).unwrap(), None);
     // The same materials are kept beside the converted ones.
-    let count = reference_io::read(&room(unrendered())).unwrap().materials.len();
-    let kept = reference_io::read_source_materials(&room(unrendered()), count).unwrap().unwrap();
+    let count = reference::read(&room(unrendered())).unwrap().materials.len();
+    let kept = reference::read_source_materials(&room(unrendered()), count).unwrap().unwrap();
     let models = |materials: &[mateval_scene::material::Material]| {
         materials
             .iter()
@@ -114,7 +114,7 @@ fn a_recipe_may_keep_the_sources_materials() {
 #[test]
 fn faulty_source_materials_are_named() {
     let copy = copied_dataset();
-    let path = room(copy.path()).source_materials().join(reference_io::SOURCE_MATERIALS);
+    let path = room(copy.path()).source_materials().join(reference::SOURCE_MATERIALS);
     let sound = std::fs::read_to_string(&path).unwrap();
     let verified = |text: &str| {
         std::fs::write(&path, text).unwrap();
@@ -149,7 +149,7 @@ fn a_metal_without_a_real_index_renders() {
         std::fs::write(&xml, text.replace("</scene>", &format!("{shapes}</scene>"))).unwrap();
         let dataset = folder.path().join("dataset");
         run(&mut build(&recipe, &dataset)).ends_with(0);
-        let scene = reference_io::read(&room(&dataset)).unwrap();
+        let scene = reference::read(&room(&dataset)).unwrap();
         let metals = scene.materials.iter().filter(|material| {
             matches!(material.model, MaterialModel::Conductor { ior: ConductorIor::EtaK { eta: [0.0, ..], .. }, .. })
         });

@@ -4,7 +4,7 @@ use super::command::{mateval, run};
 
 #[test]
 fn what_exists_is_named_and_not_downloaded_again() {
-    if mateval_testkit::data::lpips_weights("lpips-alex-v0.1.safetensors").is_none() {
+    if mateval_testkit::lpips_weights("lpips-alex-v0.1.safetensors").is_none() {
         return;
     }
     let mut command = mateval();

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{SceneId, reference_io};
+use mateval_scene::{SceneId, reference};
 use mateval_testkit::faulty_house;
 use serde_json::{Value, json};
 
@@ -42,7 +42,7 @@ fn compared(dataset: &Path, blender: &Path) -> Run {
 /// Puts the mat back into the floor.
 fn lower_the_mat(dataset: &Path) {
     let folder = SceneFolder::of(dataset, &SceneId::new("library").unwrap());
-    let mut scene = reference_io::read(&folder).unwrap();
+    let mut scene = reference::read(&folder).unwrap();
     let is_mat = |surface: &&mut mateval_scene::reference::Surface| {
         surface.mesh.triangles.len() == 2 && surface.mesh.positions.iter().all(|corner| corner.y == 1e-4)
     };
@@ -51,7 +51,7 @@ fn lower_the_mat(dataset: &Path) {
     for mat in mats {
         mat.mesh.positions.iter_mut().for_each(|corner| corner.y = 0.0);
     }
-    reference_io::write(&folder, &scene).unwrap();
+    reference::write(&folder, &scene).unwrap();
     rehash(dataset);
 }
 
@@ -139,7 +139,7 @@ fn a_floor_of_two_sheets() {
     assert!(state == "agrees" && psnr > 50.0, "{state} {psnr}");
 
     let folder = SceneFolder::of(&dataset, &SceneId::new("library").unwrap());
-    let mut scene = reference_io::read(&folder).unwrap();
+    let mut scene = reference::read(&folder).unwrap();
     let mut lowered = 0;
     for surface in &mut scene.surfaces {
         for corner in surface.mesh.positions.iter_mut().filter(|corner| corner.y == 1e-4 && corner.z > 7.69) {
@@ -148,7 +148,7 @@ fn a_floor_of_two_sheets() {
         }
     }
     assert!(lowered >= 4, "{lowered}");
-    reference_io::write(&folder, &scene).unwrap();
+    reference::write(&folder, &scene).unwrap();
     rehash(&dataset);
     let (state, psnr) = check(&dataset, &python, "base_color");
     assert!(state == "differs" && psnr < 40.0, "{state} {psnr}");

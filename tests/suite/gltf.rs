@@ -10,9 +10,9 @@ use mateval_image::{Picture, Texture, Wrap, png_io};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{Material, MaterialModel, ScalarInput};
 use mateval_scene::reference::{Emission, ReferenceScene, Surface};
-use mateval_scene::{Camera, SceneId, SceneLights, reference_io};
+use mateval_scene::{Camera, SceneId, SceneLights, reference};
 use mateval_sources::gltf::{self, GltfScene, Limits};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 use mateval_tracer::{RenderSettings, World};
 use serde_json::{Value, json};
 
@@ -23,7 +23,7 @@ use super::sample::unrendered;
 /// The sample's room, whose materials are converted, without its environment: glTF has none.
 fn room() -> ReferenceScene {
     let folder = SceneFolder::of(unrendered(), &SceneId::new("room").unwrap());
-    let mut scene = reference_io::read(&folder).unwrap();
+    let mut scene = reference::read(&folder).unwrap();
     scene.lights.retain(|light| matches!(light.emission, Emission::Area { .. }));
     scene
 }

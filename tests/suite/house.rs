@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::command::{Run, baseline, build, mateval, run, score, stats, verify};
 use super::sample::json;
 use mateval_testkit::faulty_house;
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// The house and its survey.
 struct Surveyed {

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use mateval_image::Picture;
-use mateval_testkit::data::{report_missing, shared_data};
+use mateval_testkit::{report_missing, shared_data};
 use serde_json::Value;
 
 use super::command::{mateval, run};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, Wrap, png_io};
-use mateval_scene::uv_atlas::UvAtlas;
+use mateval_scene::mesh::UvAtlas;
 use mateval_scene::{TriangleMesh, glb};
 use serde_json::{Value, json};
 

@@ -8,12 +8,12 @@ use mateval_image::exr_io::{self, Precision};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::glb;
-use mateval_scene::uv_atlas::UvAtlas;
+use mateval_scene::mesh::UvAtlas;
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, score};
 use super::sample::{json, write_source};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// Width and height of the room's pictures, in pixels.
 const WIDTH: usize = 96;

@@ -69,7 +69,7 @@ fn every_source_file_states_its_content() {
             silent.push(path);
         }
     }
-    assert!(seen > 350, "only {seen} files seen");
+    assert!(seen > 250, "only {seen} files seen");
     assert!(silent.is_empty(), "begin these files with a line that states their content: {silent:?}");
     assert!(!introduces_itself("use std::path::Path;") && !introduces_itself("//! Tests.\n"));
 }

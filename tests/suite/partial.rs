@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 use super::command::{Run, baseline, build, run, run_words, score, verify};
 use super::sample::{self, SMALL, json, write_source};

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::command::{Run, baseline, mateval, run, score, verify};
 use super::sample::{files_below, json, unrendered};
 use super::stated::dataset;
-use mateval_testkit::kept_folder::copy_folder;
+use mateval_testkit::copy_folder;
 
 fn perturb(dataset: &Path, kind: &str, level: u32, out: &Path) -> Run {
     let mut command = mateval();

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Picture, exr_io, png_io};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 use serde_json::{Value, json};
 
 use super::command::{baseline, build, mateval, render, run, run_words, verify};
@@ -110,7 +110,7 @@ fn pictures_of_light_are_those_of_the_other_scenes() {
 #[test]
 fn a_changed_photo_is_found() {
     let twin = kept_folder("photo_changed").join("dataset");
-    mateval_testkit::kept_folder::copy_folder(&dataset("alone"), &twin);
+    mateval_testkit::copy_folder(&dataset("alone"), &twin);
     let folder = twin.join("scenes/photographed");
     exr_io::write_linear(
         &folder.join("views/input/rgb.exr"),

@@ -7,15 +7,15 @@ use std::sync::LazyLock;
 use glam::{DVec2, DVec3};
 use mateval_baselines::estimate::Estimate;
 use mateval_baselines::geometry::SceneGeometry;
+use mateval_baselines::geometry::SeenPixels;
 use mateval_baselines::lift::{Texel, lift, place_of};
-use mateval_baselines::seen::SeenPixels;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_procedural::library::entry;
+use mateval_scene::mesh::UvAtlas;
 use mateval_scene::open::Dataset;
-use mateval_scene::uv_atlas::UvAtlas;
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 use super::command::{Run, baseline, run};
 use super::lifting::{ROOM, base_colors};

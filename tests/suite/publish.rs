@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::command::{Run, baseline, run, run_words, score, verify};
 use super::sample::{copied_dataset, dataset, files_below, manifest};
-use mateval_testkit::kept_folder::copy_folder;
+use mateval_testkit::copy_folder;
 
 fn publish(dataset: &Path, out: &Path) -> Run {
     let (public, private) = (out.join("public"), out.join("private"));

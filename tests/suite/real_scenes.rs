@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mateval_scene::Severity;
 use mateval_sources::bitterli;
-use mateval_testkit::data::shared_data;
+use mateval_testkit::shared_data;
 
 use super::command::{baseline, build, run, score, verify};
 use super::sample::json;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::command::{build, mateval, render, run, verify};
 use super::sample::{SMALL, copied_dataset, dataset, manifest, recipe_text, write_source};
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// A source whose recipe has two scenes, its whole dataset, and that one's manifest.
 struct Whole {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use super::command::{build, render, run, run_words};
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// 96x72 pixels and atlases of 128 texels: all five views are built and rendered within seconds.
 pub const SMALL: &str = "resolution = [96, 72]\natlas_size = 128";

@@ -6,12 +6,12 @@ use std::sync::LazyLock;
 
 use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{exr_io, png_io};
-use mateval_testkit::data::report_missing;
+use mateval_testkit::report_missing;
 use serde_json::Value;
 
 use super::command::{baseline, build, mateval, run, score};
 use super::sample::{json, write_source};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen
 /// by the tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.

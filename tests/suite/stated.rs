@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::command::{baseline, build, render, run, run_words, score, verify};
 use super::sample::json;
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// The source, and the dataset of its living room with stated materials, rendered.
 static STATED: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::command::{Run, mateval, run};
 use super::sample::json as read_json;
-use mateval_testkit::kept_folder::{copy_folder, kept_folder};
+use mateval_testkit::{copy_folder, kept_folder};
 
 /// Houses in the source beside the built-in one.
 const HOUSES: usize = 5;

@@ -8,7 +8,7 @@ use glam::{DMat4, DVec2, DVec3};
 use mateval_image::{exr_io, png_io};
 use mateval_scene::Camera;
 use mateval_scene::glb;
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 use serde_json::Value;
 
 use super::command::{baseline, build, render, run, run_words, verify};
@@ -66,7 +66,7 @@ fn drawn_views_stand_where_they_should() {
 #[test]
 fn a_moved_view_is_found() {
     let twin = kept_folder("wide_views_moved").join("dataset");
-    mateval_testkit::kept_folder::copy_folder(&SCORED.join("wide"), &twin);
+    mateval_testkit::copy_folder(&SCORED.join("wide"), &twin);
     let path = twin.join("scenes/room/scene.json");
     let mut scene = json(&path);
     let x = &mut scene["views"][3]["camera"]["world_from_camera"][0][3];

@@ -19,7 +19,7 @@ use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::joint_fit::JointFitRules;
 use mateval_scene::open::Dataset;
-use mateval_scene::process_cpu::used;
+use mateval_scene::scene_cost::processor_time;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
@@ -53,9 +53,9 @@ fn main() {
         let photo = EstimateSource::Input.read(&dataset, scene, &|_| ()).unwrap().base_color.unwrap();
         line("photo", &photo, &truth, &geometry.valid, "");
         for (name, options) in &variants {
-            let before = used().unwrap_or_default().as_secs_f64();
+            let before = processor_time().unwrap_or_default().as_secs_f64();
             let found = delight(&geometry, options, &|_| ()).unwrap();
-            let seconds = used().unwrap_or_default().as_secs_f64() - before;
+            let seconds = processor_time().unwrap_or_default().as_secs_f64() - before;
             let more = format!("{} rounds, {seconds:.0} s", found.rounds);
             line(name, &found.base_color, &truth, &geometry.valid, &more);
             if *name == "delight" {

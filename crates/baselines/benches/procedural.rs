@@ -12,7 +12,7 @@ use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::procedural::{ProceduralOptions, scene_maps};
 use mateval_scene::open::Dataset;
-use mateval_scene::process_cpu::used;
+use mateval_scene::scene_cost::processor_time;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
@@ -41,7 +41,7 @@ fn main() {
 }
 
 fn seconds() -> f64 {
-    used().unwrap_or_default().as_secs_f64()
+    processor_time().unwrap_or_default().as_secs_f64()
 }
 
 /// Peak resident memory; 0 where the system does not state it.

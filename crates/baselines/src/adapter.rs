@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use mateval_image::texture_io::read_texture;
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
-use mateval_scene::stored_encoding::StoredEncoding;
 use mateval_scene::submission::Map;
+use mateval_scene::submission::StoredEncoding;
 use serde::Deserialize;
 
 use crate::error::{AdapterError, BaselineError};

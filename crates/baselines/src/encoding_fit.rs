@@ -10,7 +10,7 @@
 //! best encoding must explain at least [`LEAST_EXPLAINED`] of the truth's variance, and the error of every other one must
 //! be at least [`CLEARLY_WORSE`] times as large.
 
-use mateval_scene::stored_encoding::StoredEncoding;
+use mateval_scene::submission::StoredEncoding;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

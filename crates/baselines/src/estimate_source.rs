@@ -9,8 +9,8 @@ use mateval_scene::Progress;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
-use mateval_scene::stored_encoding::StoredEncoding;
 use mateval_scene::submission::Map;
+use mateval_scene::submission::StoredEncoding;
 
 use crate::adapter::Adapter;
 use crate::delight::{CandidateLights, DelightOptions, delight};

@@ -131,7 +131,7 @@ pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) ->
 mod tests {
     use glam::Vec3;
     use mateval_image::Picture;
-    use mateval_scene::uv_atlas::UvAtlas;
+    use mateval_scene::mesh::UvAtlas;
 
     use super::FillRule;
     use super::*;

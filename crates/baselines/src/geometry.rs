@@ -9,7 +9,7 @@ use mateval_image::{Mask, Picture, png_io};
 use mateval_scene::dataset::{Part, SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::submission::MAP_SIZES;
-use mateval_scene::{Camera, PartSetId, SceneError, TriangleMesh, glb, plain_instances};
+use mateval_scene::{Camera, PartSetId, SceneError, TriangleMesh, glb, reference};
 use mateval_tracer::World;
 use mateval_tracer::aov::{COARSE_SUBPIXELS, coarse_subpixels, hit_through};
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ impl<'a> SceneGeometry<'a> {
             let what = format!("instance '{}' has an atlas of {size} texels; run `mateval prep verify`", instance.id);
             return Err(SceneError::Unsupported { path: folder.scene_file(), what }.into());
         }
-        let world = World::new(Arc::new(plain_instances::read(&folder, scene)?))?;
+        let world = World::new(Arc::new(reference::read_plain(&folder, scene)?))?;
         let valid = png_io::read_mask(&shown.join("valid.png"))?;
         let instances = png_io::read_ids(&shown.join("instance.png"))?;
         let size = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);

@@ -31,29 +31,3 @@ pub mod procedural;
 pub mod submission;
 
 pub use error::BaselineError;
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod grey {
-    pub use crate::homogeneous::write_grey as write;
-}
-#[doc(hidden)]
-pub mod partfield {
-    pub use crate::bridges::{export_partfield as export, import_partfield as import};
-}
-#[doc(hidden)]
-pub mod seen {
-    pub use crate::geometry::SeenPixels;
-}
-#[doc(hidden)]
-pub mod seen_cloud {
-    pub use crate::fill::FillRule;
-}
-#[doc(hidden)]
-pub mod texgen {
-    pub use crate::bridges::{export_texgen as export, import_texgen as import};
-}
-#[doc(hidden)]
-pub mod truth {
-    pub use crate::submission::write_truth as write;
-}

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use mateval_image::Picture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::camera::Projection;
-use mateval_scene::uv_atlas::UvAtlas;
+use mateval_scene::mesh::UvAtlas;
 use mateval_tracer::Ray;
 use rayon::prelude::*;
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::is_rendered;
 use mateval_scene::open::Dataset;
-use mateval_scene::stored_encoding::StoredEncoding;
+use mateval_scene::submission::StoredEncoding;
 use mateval_scene::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
 use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
 use mateval_scene::{Progress, Report, SceneError, json};

@@ -12,10 +12,10 @@ use clap::ValueEnum;
 use mateval_baselines::delight::relight::{self, Dimmed, RelightOptions};
 use mateval_baselines::delight::{self, CandidateLights, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
+use mateval_baselines::fill::FillRule;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, FitMode, ProceduralOptions, report_folder};
-use mateval_baselines::seen_cloud::FillRule;
-use mateval_baselines::{grey, homogeneous, partfield, texgen, truth};
+use mateval_baselines::{bridges, homogeneous, submission};
 use mateval_scene::PartSetId;
 
 use crate::arguments::{EstimateArgs, ExportPlaces, Places};
@@ -99,8 +99,8 @@ pub struct MedianPartArgs {
 
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Gt(places) => places.done(truth::write(&places.open()?, &places.out, places.force)?),
-        Command::Grey(places) => places.done(grey::write(&places.open()?, &places.out, places.force)?),
+        Command::Gt(places) => places.done(submission::write_truth(&places.open()?, &places.out, places.force)?),
+        Command::Grey(places) => places.done(homogeneous::write_grey(&places.open()?, &places.out, places.force)?),
         Command::Nn(args) => nearest_neighbours(args),
         Command::Median(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
@@ -313,7 +313,7 @@ impl TexgenExportArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let source = self.estimate.source(EstimateSource::Truth)?;
         let dataset = self.places.open()?;
-        let count = with_progress(|progress| texgen::export(&dataset, &self.places.out, &source, progress))?;
+        let count = with_progress(|progress| bridges::export_texgen(&dataset, &self.places.out, &source, progress))?;
         print(&format!("{}: {count} objects\n", self.places.out.display()))?;
         Ok(Outcome::Good)
     }
@@ -328,7 +328,7 @@ impl TexgenImportArgs {
         let (places, source) = (&self.places, self.estimate.source(EstimateSource::Truth)?);
         let dataset = places.open()?;
         let found = with_progress(|progress| {
-            texgen::import(&dataset, &self.results, &places.out, places.force, &source, progress)
+            bridges::import_texgen(&dataset, &self.results, &places.out, places.force, &source, progress)
         })?;
         print(&format!("{}: {} textures found\n", self.results.display(), found.textured))?;
         places.done(found.instances)
@@ -347,7 +347,7 @@ pub struct PartfieldImportArgs {
 }
 
 fn partfield_export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
-    let count = partfield::export(&places.open()?, &places.out)?;
+    let count = bridges::export_partfield(&places.open()?, &places.out)?;
     print(&format!("{}: {count} mesh{}\n", places.out.display(), if count == 1 { "" } else { "es" }))?;
     Ok(Outcome::Good)
 }
@@ -355,7 +355,7 @@ fn partfield_export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
 impl PartfieldImportArgs {
     /// Copies the labels to where a recipe expects them.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let count = partfield::import(&self.places.open()?, &self.clusters, self.parts, &self.places.out)?;
+        let count = bridges::import_partfield(&self.places.open()?, &self.clusters, self.parts, &self.places.out)?;
         print(&format!("{}: labels of {}\n", self.places.out.display(), counted(count, "instance")))?;
         Ok(Outcome::Good)
     }

@@ -13,17 +13,17 @@ use mateval_baselines::delight::{self, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
-use mateval_baselines::{grey, homogeneous, truth};
+use mateval_baselines::{homogeneous, submission};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
-use mateval_eval::light::rules::Track;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::protocol::Track;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_metrics::Net;
+use mateval_prep::build::finish::finish_again;
 use mateval_prep::build::{BuildOptions, build};
-use mateval_prep::finish::finish_again;
 use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
-use mateval_report::leaderboard::results_folder::ResultsFolder;
+use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
 use mateval_report::strips::Shown;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables, wrapped};
@@ -339,8 +339,8 @@ fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> an
             continue;
         }
         match baseline {
-            DemoBaseline::Gt => truth::write(dataset, &out, false)?,
-            DemoBaseline::Grey => grey::write(dataset, &out, false)?,
+            DemoBaseline::Gt => submission::write_truth(dataset, &out, false)?,
+            DemoBaseline::Grey => homogeneous::write_grey(dataset, &out, false)?,
             DemoBaseline::Nn => with_progress(|progress| {
                 nn::write(dataset, &out, false, &EstimateSource::Truth, &NnOptions::default(), progress)
             })?,

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_procedural::finding::Finding;
+use mateval_procedural::error::Finding;
+use mateval_procedural::evaluator::{Pixel, Square, render};
 use mateval_procedural::graph::Parameter;
 use mateval_procedural::library::{LIBRARY, entry};
-use mateval_procedural::limits::Limits;
+use mateval_procedural::mtlx::Limits;
 use mateval_procedural::mtlx::read_file;
-use mateval_procedural::picture::{Pixel, Square, render};
 use mateval_procedural::value::Value;
 use mateval_procedural::{Graph, ProceduralError, Program, Settings};
 use mateval_scene::json;

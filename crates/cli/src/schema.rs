@@ -13,15 +13,15 @@ use mateval_prep::blender::{BlenderJob, BlenderResult};
 use mateval_prep::survey::SurveyFile;
 use mateval_release::ReleaseFile;
 use mateval_report::explain::file::ExplainFile;
-use mateval_report::leaderboard::errata::ErrataFile;
+use mateval_report::leaderboard::entries::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
-use mateval_scene::material_class::MaterialClassesFile;
-use mateval_scene::reference_io::{LightsFile, ReferenceFile, SourceMaterialsFile};
+use mateval_scene::material::MaterialClassesFile;
+use mateval_scene::reference::{LightsFile, ReferenceFile, SourceMaterialsFile};
 use mateval_scene::render_file::RenderFile;
-use mateval_scene::scorer_file::ScorerFile;
+use mateval_scene::render_file::ScorerFile;
 use mateval_scene::submission::SubmissionFile;
-use mateval_scene::{compare_file, json};
+use mateval_scene::{json, render_file};
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
 
@@ -76,7 +76,7 @@ fn schemas() -> [(&'static str, Schema); 26] {
         ("blender_job", schema_for!(BlenderJob)),
         ("blender_result", schema_for!(BlenderResult)),
         ("compare", schema_for!(CompareFile)),
-        ("compare_verdict", schema_for!(compare_file::CompareFile)),
+        ("compare_verdict", schema_for!(render_file::CompareFile)),
         ("encoding", schema_for!(EncodingReport)),
         ("import", schema_for!(ImportReport)),
         ("import_materials", schema_for!(FlatMaterials)),

@@ -8,7 +8,7 @@
 use mateval_light::light_fit;
 use mateval_metrics::{Psnr, flip, lpips, ssim};
 use mateval_scene::submission::MAP_SIZES;
-use mateval_submission::{bad_texels, default_map, map_file, memory_budget, reach, texel_map};
+use mateval_submission::{atlas, map_file, prediction, texel_map};
 use mateval_tracer::emitter::group_shares;
 use mateval_tracer::{emitter, noise_filter, world};
 use schemars::JsonSchema;
@@ -49,17 +49,17 @@ fixed_rules! {
     /// Value that replaces a missing or unsound base colour, linear. The format promises it to methods that leave maps out.
     missing_base_color: f32 = mateval_scene::submission::GREY,
     /// Value that replaces a missing or unsound roughness, as the format promises.
-    missing_roughness: f32 = default_map::MISSING_ROUGHNESS,
+    missing_roughness: f32 = map_file::MISSING_ROUGHNESS,
     /// Value that replaces a missing or unsound metallic, as the format promises.
-    missing_metallic: f32 = default_map::MISSING_METALLIC,
+    missing_metallic: f32 = map_file::MISSING_METALLIC,
     /// A texel of a base colour with a value outside this range is bad, by the format.
-    base_color_range: [f32; 2] = [*bad_texels::BASE_COLOR_RANGE.start(), *bad_texels::BASE_COLOR_RANGE.end()],
+    base_color_range: [f32; 2] = [*map_file::BASE_COLOR_RANGE.start(), *map_file::BASE_COLOR_RANGE.end()],
     /// A texel of a roughness or metallic with a value outside this range is bad, by the format.
-    scalar_range: [f32; 2] = [*bad_texels::SCALAR_RANGE.start(), *bad_texels::SCALAR_RANGE.end()],
+    scalar_range: [f32; 2] = [*map_file::SCALAR_RANGE.start(), *map_file::SCALAR_RANGE.end()],
     /// A map of whose reached texels a larger share than this is bad is unsound, by the format.
-    most_bad_share: f64 = bad_texels::MOST_BAD_SHARE,
+    most_bad_share: f64 = map_file::MOST_BAD_SHARE,
     /// How much further than one texel from the surface a reached texel may lie, in texels, for uv of up to 1.
-    reach_margin: f64 = reach::REACH_MARGIN,
+    reach_margin: f64 = atlas::REACH_MARGIN,
     /// The smallest and the largest side of a map, in texels, by the format.
     map_sides: [usize; 2] = [*MAP_SIZES.start(), *MAP_SIZES.end()],
     /// A map whose file is larger than this, in bytes, is unsound, by the format.
@@ -67,7 +67,7 @@ fixed_rules! {
     /// An EXR map of more numbers than this is unsound, by the format.
     most_exr_numbers: usize = map_file::MAX_EXR_NUMBERS,
     /// Maps of a scene that take more memory than this together, in bytes, are unsound, by the format.
-    most_scene_bytes: usize = memory_budget::MAX_SCENE_BYTES,
+    most_scene_bytes: usize = prediction::MAX_SCENE_BYTES,
     /// `specular` of predictions, which submissions do not hold.
     predicted_specular: f32 = mateval_tracer::repaint::SPECULAR,
     /// The largest PSNR, in dB, which an MSE of 1e-10 or less has. Results of all protocols are shown in one table.

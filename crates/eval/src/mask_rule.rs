@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mateval_image::{Mask, Picture, SrgbRgb};
-use mateval_metrics::mask::pixel_count;
+use mateval_metrics::pixel::pixel_count;
 use mateval_metrics::{Features, Lpips, MaskedSsim, MetricError, Pixel, ssim_black_fill, ssim_valid_windows};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_light::rules::{FitRules, StageRules};
+use mateval_light::light_fit::FitRules;
+use mateval_light::light_stage::StageRules;
 use mateval_scene::SceneId;
 use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;

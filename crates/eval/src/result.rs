@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::dataset_id::DatasetId;
-use mateval_scene::perturbation::Perturbation;
+use mateval_scene::dataset::Perturbation;
+use mateval_scene::open::DatasetId;
 use mateval_scene::submission::Cost;
 use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;

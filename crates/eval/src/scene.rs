@@ -10,7 +10,7 @@ use mateval_metrics::{Lpips, MetricError};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder, is_rendered};
 use mateval_scene::open::Dataset;
-use mateval_scene::{Progress, RendererId, SceneError, SceneId, TriangleMesh, ViewId, glb, reference_io};
+use mateval_scene::{Progress, RendererId, SceneError, SceneId, TriangleMesh, ViewId, glb, reference};
 use mateval_submission::prediction::PredictedScene;
 use mateval_tracer::World;
 use serde::{Deserialize, Serialize};
@@ -80,7 +80,7 @@ impl OpenScene {
         let is_needed = |file: &str| !is_rendered(file) && !file.starts_with("views/input/rgb.");
         dataset.check_files(&scene.id, is_needed)?;
         let folder = dataset.folder(&scene.id);
-        let world = World::new(Arc::new(reference_io::read(&folder)?))?;
+        let world = World::new(Arc::new(reference::read(&folder)?))?;
         let atlases = read_atlases(&folder, scene, &world)?;
         Ok(Self { folder, world, atlases })
     }
@@ -227,7 +227,7 @@ impl MaskedRegion {
             picture: PictureName { kind, surfaces: self.surfaces },
             lighting,
             region: self.region,
-            pixels: mateval_metrics::mask::pixel_count(&self.mask),
+            pixels: mateval_metrics::pixel::pixel_count(&self.mask),
             values: Default::default(),
             mse_error: None,
             exact: false,

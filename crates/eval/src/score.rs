@@ -6,18 +6,18 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_metrics::Lpips;
-use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::compare_file::{CompareCounts, CompareFile};
 use mateval_scene::dataset::SceneFile;
-use mateval_scene::dataset_id::DatasetId;
+use mateval_scene::layout::BuildFolder;
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::open::Dataset;
+use mateval_scene::open::DatasetId;
+use mateval_scene::render_file::{CompareCounts, CompareFile};
 use mateval_scene::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
-use mateval_submission::atlas_meshes::AtlasMeshes;
-use mateval_submission::hashed_file::{HashedFile, submission_sha256};
+use mateval_submission::atlas::AtlasMeshes;
+use mateval_submission::files::SubmissionJson;
+use mateval_submission::files::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
-use mateval_submission::submission_json::SubmissionJson;
 
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;

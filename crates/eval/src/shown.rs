@@ -9,7 +9,7 @@ use mateval_image::{LinearRgb, Picture, SrgbRgb, exr_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::open::Dataset;
 use mateval_scene::{InstanceId, Progress, SceneId, TriangleMesh, ViewId};
-use mateval_submission::atlas_meshes::AtlasMeshes;
+use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 use crate::error::EvalError;

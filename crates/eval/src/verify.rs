@@ -9,7 +9,7 @@ use std::path::Path;
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, Progress, Severity, json};
-use mateval_submission::hashed_submission::hashed_submission;
+use mateval_submission::prediction::hashed_submission;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -11,10 +11,3 @@ pub mod light_stage;
 mod ridge_fit;
 
 pub use light_fit::LightError;
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod rules {
-    pub use crate::light_fit::FitRules;
-    pub use crate::light_stage::StageRules;
-}

@@ -404,7 +404,7 @@ mod tests {
 
     use mateval_scene::dataset::{FORMAT, Instance, SceneSource, TrueMaterials, View};
     use mateval_scene::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
-    use mateval_testkit::box_room::{WALLS, box_room, camera, quad};
+    use mateval_testkit::scenes::{WALLS, box_camera, box_quad, box_room};
 
     use super::*;
 
@@ -427,7 +427,7 @@ mod tests {
 
     #[test]
     fn an_empty_room() {
-        let lights = lights(&rules(), &world(Vec::new()), &WALLS, &[camera()]);
+        let lights = lights(&rules(), &world(Vec::new()), &WALLS, &[box_camera()]);
         // Four columns; the picture's upper edge rises by 0.325 a metre: the ceiling, 1.3 above, is in view from 4 metres
         // before the camera on. Cells end 0.25 beyond their middles, which are at 0.5, 1.5, ...
         let ceiling = named(&lights, "ceiling");
@@ -451,19 +451,19 @@ mod tests {
     /// Turned views see more of the room, so that fewer cells and walls get a light.
     #[test]
     fn no_light_lies_in_any_view() {
-        let turned = camera().turned(5.0, 5.0);
+        let turned = box_camera().turned(5.0, 5.0);
         let room = world(Vec::new());
-        let one = lights(&rules(), &room, &WALLS, &[camera()]);
-        let two = lights(&rules(), &room, &WALLS, &[camera(), turned]);
+        let one = lights(&rules(), &room, &WALLS, &[box_camera()]);
+        let two = lights(&rules(), &room, &WALLS, &[box_camera(), turned]);
         assert!(named(&two, "ceiling").len() < named(&one, "ceiling").len());
     }
 
     /// A screen across the room hides its far part, and a low ledge is not a wall.
     #[test]
     fn hidden_and_low_pieces_get_no_light() {
-        let screen = quad([0.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 2.5, 0.0]);
-        let ledge = quad([0.0, 1.0, 5.9], [4.0, 0.0, 0.0], [0.0, 0.2, 0.0]);
-        let lights = lights(&rules(), &world(vec![screen, ledge]), &[2, 3, 4, 5, 6, 7], &[camera()]);
+        let screen = box_quad([0.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 2.5, 0.0]);
+        let ledge = box_quad([0.0, 1.0, 5.9], [4.0, 0.0, 0.0], [0.0, 0.2, 0.0]);
+        let lights = lights(&rules(), &world(vec![screen, ledge]), &[2, 3, 4, 5, 6, 7], &[box_camera()]);
         let ceiling = named(&lights, "ceiling");
         assert!(!ceiling.is_empty());
         assert!(ceiling.iter().all(|light| light.light.mesh.positions.iter().all(|p| p.z > 3.0)));
@@ -477,7 +477,7 @@ mod tests {
     /// The names of the lights in a room whose architecture is a piece of furniture or a wall that no view sees: a screen behind
     /// the camera, of the given role and without a category.
     fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
-        let screen = quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
+        let screen = box_quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
         let world = world(vec![screen]);
         let wall = Role::Architecture { kind: "WallInner".to_owned() };
         let roles = std::iter::repeat_n(&wall, 6).chain([role]);
@@ -500,7 +500,7 @@ mod tests {
                 id: ViewId::new("input").unwrap(),
                 x_deg: 0.0,
                 y_deg: 0.0,
-                camera: camera(),
+                camera: box_camera(),
                 wide: None,
             }],
             instances: roles.zip(1..).map(|(role, index)| instance(index, role)).collect(),

@@ -26,17 +26,3 @@ pub use lpips::{Features, Lpips, Net};
 pub use mse::{Psnr, mse};
 pub use pixel::{MetricError, Pixel};
 pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod mask {
-    pub use crate::pixel::{black_filled, pixel_count, reference_filled};
-}
-#[doc(hidden)]
-pub mod error {
-    pub use crate::pixel::{MetricError, Size};
-}
-#[doc(hidden)]
-pub mod psnr {
-    pub use crate::mse::Psnr;
-}

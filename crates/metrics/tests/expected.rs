@@ -9,7 +9,7 @@ use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, Net, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
-use mateval_testkit::data::{lpips_weights, shared_data};
+use mateval_testkit::{lpips_weights, shared_data};
 use serde::Deserialize;
 
 /// Number of generated cases; all have a mask.

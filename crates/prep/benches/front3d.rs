@@ -12,8 +12,8 @@ use mateval_prep::build::materials::bake;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_sources::front3d::room_scene::room_scene;
 use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish, read_house};
-use mateval_testkit::data::shared_data;
 use mateval_testkit::faulty_house;
+use mateval_testkit::shared_data;
 use mateval_tracer::World;
 
 const STAGES: [&str; 6] =

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use mateval_scene::dataset::PerturbationKind;
 use mateval_scene::ids::quoted;
-use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{SceneId, ViewId};
 
 use crate::build::fault::SceneFault;

@@ -22,17 +22,3 @@ pub mod survey;
 pub mod views;
 
 pub use error::PrepError;
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod bring_up_to_date {
-    pub use crate::build::finish::bring_up_to_date;
-}
-#[doc(hidden)]
-pub mod faults {
-    pub use crate::scene_meshes::Faults;
-}
-#[doc(hidden)]
-pub mod finish {
-    pub use crate::build::finish::{finish, finish_again};
-}

@@ -29,22 +29,3 @@ pub use error::ProceduralError;
 pub use evaluator::Evaluator;
 pub use graph::{Graph, Settings};
 pub use program::Program;
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod finding {
-    pub use crate::error::Finding;
-}
-#[doc(hidden)]
-pub mod lanes {
-    pub use crate::evaluator::Points;
-    pub use crate::program::op::LANES;
-}
-#[doc(hidden)]
-pub mod limits {
-    pub use crate::mtlx::Limits;
-}
-#[doc(hidden)]
-pub mod picture {
-    pub use crate::evaluator::{Pixel, Square, render};
-}

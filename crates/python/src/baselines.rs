@@ -7,15 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use mateval_baselines::delight::{CandidateLights, DelightOptions, DelitPhoto};
 use mateval_baselines::estimate::Estimate;
+use mateval_baselines::fill::FillRule;
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::nn::{NnOptions, lift_scene, seen_pixels};
 use mateval_baselines::procedural::{ProceduralOptions, scene_maps};
-use mateval_baselines::seen_cloud::FillRule;
 use mateval_baselines::{BaselineError, delight as baseline, maps};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::{PartSetId, Progress};
-use mateval_submission::bad_texels::BASE_COLOR_RANGE;
+use mateval_submission::map_file::BASE_COLOR_RANGE;
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Role, SceneError, TriangleMesh, dataset, open, plain_instances};
+use mateval_scene::{Role, SceneError, TriangleMesh, dataset, open, reference};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -218,7 +218,7 @@ impl SceneSource {
             return Ok(Arc::clone(&meshes[instance]));
         }
         // Reading fails where the file holds other instances than scene.json.
-        let surfaces = plain_instances::read(&self.folder(), self.file())?.surfaces;
+        let surfaces = reference::read_plain(&self.folder(), self.file())?.surfaces;
         let meshes: Vec<Arc<TriangleMesh>> = surfaces.into_iter().map(|surface| Arc::new(surface.mesh)).collect();
         // Two threads may both read; no lock is held meanwhile, which a forked child could wait for.
         Ok(Arc::clone(&self.meshes.get_or_init(|| meshes)[instance]))

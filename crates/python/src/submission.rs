@@ -11,7 +11,7 @@ use mateval_scene::open::Dataset as OpenDataset;
 use mateval_scene::submission::{Cost, MAP_SIZES, Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, instance_folder};
 use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{SceneError, SceneId, json};
-use mateval_submission::bad_texels::{BASE_COLOR_RANGE, SCALAR_RANGE};
+use mateval_submission::map_file::{BASE_COLOR_RANGE, SCALAR_RANGE};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

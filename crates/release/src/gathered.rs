@@ -9,7 +9,7 @@ use std::path::Path;
 
 use mateval_audit::stats::StatsFile;
 use mateval_eval::light::reference::RELEASE_SAMPLES;
-use mateval_image::jpeg_io::jpeg_bytes;
+use mateval_image::png_io::jpeg_bytes;
 use mateval_image::store::write_whole;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
@@ -19,8 +19,8 @@ use mateval_scene::dataset::{DatasetFile, SceneFile, Target};
 use mateval_scene::layout::INPUT;
 use mateval_scene::manifest::{self, sha256_of_bytes};
 use mateval_scene::open::Dataset;
+use mateval_scene::render_file::ScorerFile;
 use mateval_scene::render_file::{RENDER_FILE, RenderFile};
-use mateval_scene::scorer_file::ScorerFile;
 use mateval_scene::{RendererId, SceneError, SceneId, ViewId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

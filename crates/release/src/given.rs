@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use mateval_audit::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, State};
 use mateval_eval::EvalError;
+use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_eval::result_key::ResultKey;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, SceneError, SceneId, Severity, json};

@@ -178,9 +178,3 @@ fn check_place(options: &ReleaseOptions) -> Result<(), ReleaseError> {
     }
     Ok(check_free(out, options.force, "--report")?)
 }
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod publication {
-    pub use crate::file::Day;
-}

@@ -241,7 +241,7 @@ mod tests {
 
     use mateval_audit::compare::file::State;
     use mateval_audit::stats::{CountedDataset, Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
-    use mateval_eval::result_key::ResultKey;
+    use mateval_eval::result::key::ResultKey;
     use mateval_scene::scene_cost::{Step, StepCost};
     use mateval_scene::{SceneId, SourceKind, ViewId};
 

@@ -2,8 +2,8 @@
 
 use mateval_audit::compare::file::State;
 use mateval_audit::stats::SceneStats;
-use mateval_eval::metric::Metric;
-use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces, Views};
+use mateval_eval::result::key::Metric;
+use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
 use mateval_scene::scene_cost::{Step, StepCost};
 use mateval_scene::{Finding, Severity};
 use serde::Serialize;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
-use mateval_eval::result_key::ResultKey;
+use mateval_eval::result::key::ResultKey;
 use mateval_scene::{Finding, SceneId};
 
 /// Why results could not be shown.

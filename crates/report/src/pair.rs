@@ -101,7 +101,7 @@ fn values(
             let (mse, psnr) = errors(prediction, reference, Some(mask))?;
             let inside = ssim_valid_windows(p, r, mask)?;
             Some(MaskedValues {
-                pixels: mateval_metrics::mask::pixel_count(mask),
+                pixels: mateval_metrics::pixel::pixel_count(mask),
                 mse,
                 psnr,
                 ssim_inside: inside.as_ref().map(|s| s.ssim),

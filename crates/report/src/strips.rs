@@ -11,10 +11,10 @@ use mateval_scene::work_folder::check_free;
 use mateval_scene::{Progress, Report, SceneError, SceneId};
 
 use crate::error::ReportError;
-use mateval_eval::light::rules::{SampleRules, Track};
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result_key::PictureKind;
-use mateval_eval::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
+use mateval_eval::protocol::{SampleRules, Track};
+use mateval_eval::result::key::PictureKind;
+use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
 
 /// In novel views, pixels that the input view sees are darkened to this share of their sRGB values.

@@ -24,16 +24,6 @@ pub mod surface_mesh;
 
 pub use error::{InvalidSource, SourceError};
 
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod clearance {
-    pub use crate::front3d::camera_sampler::distance_to_anything;
-}
-#[doc(hidden)]
-pub mod parts {
-    pub use crate::surface_mesh::{MAX_PARTS, connected_parts, parts_of_labels};
-}
-
 /// The fallback values of all readers, in one place: each is a finding, or marks the base colour as unstated, which
 /// `prep build` reports and refuses beyond a small share.
 #[cfg(test)]

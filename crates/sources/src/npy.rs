@@ -2,8 +2,9 @@
 //!
 //! The header is checked before the library sees it, and the data must have exactly the length that follows from it.
 
-use mateval_image::npy_header::{self, NpyHeaderError};
-pub use mateval_image::npy_header::{MAX_HEADER_BYTES, MAX_PREFIX_BYTES};
+use mateval_image::npy_io;
+use mateval_image::npy_io::NpyHeaderError;
+pub use mateval_image::npy_io::{MAX_HEADER_BYTES, MAX_PREFIX_BYTES};
 
 /// The widest integer, in bytes.
 pub const MAX_NUMBER_BYTES: usize = 8;
@@ -32,7 +33,7 @@ fn joined(shape: &[u64]) -> String {
 /// wrap around to negative ones.
 pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, NpyError> {
     // The header, before and by the library.
-    let data = npy_header::checked_data(bytes)?;
+    let data = npy_io::checked_data(bytes)?;
     let unsound = |reason| NpyError::Unsound { reason };
     let file = npyz::NpyFile::new(bytes).map_err(unsound)?;
     let count = length(file.shape())?;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
 use mateval_image::ImageError;
+use mateval_scene::material::MaterialClass;
 use mateval_scene::material::StatedParameters;
-use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 use mateval_scene::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};

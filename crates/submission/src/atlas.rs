@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
-use mateval_scene::{SceneError, TriangleMesh, plain_instances};
+use mateval_scene::{SceneError, TriangleMesh, reference};
 
 /// By how much the square of texels that a place reads is larger on each side, in texels, for coordinates of up to 1; in proportion beyond. Lookups
 /// round to single precision: in the largest map they are off by up to a thousandth of a texel.
@@ -58,7 +58,7 @@ impl<'a> AtlasMeshes<'a> {
 fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Vec<TriangleMesh>, SceneError> {
     // They decide what a bad texel scores, so they must be those that the dataset's fingerprint covers.
     dataset.check_files(&scene.id, |file| file == "geometry/instances.glb")?;
-    let instances = plain_instances::read(&dataset.folder(&scene.id), scene)?;
+    let instances = reference::read_plain(&dataset.folder(&scene.id), scene)?;
     Ok(instances.surfaces.into_iter().map(|surface| surface.mesh).collect())
 }
 

@@ -7,9 +7,9 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use mateval_image::exr_header::{EXR_SIGNATURE, ExrHeader};
-use mateval_image::png_header::{PNG_SIGNATURE, PngHeader};
-use mateval_image::{ImageError, Texels, Texture, map_io};
+use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
+use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
+use mateval_image::{ImageError, Texels, Texture, texture_io};
 use mateval_scene::findings::shortened;
 use mateval_scene::submission::{GREY, MAP_SIZES, Map};
 use mateval_scene::{SceneError, TriangleMesh};
@@ -206,10 +206,10 @@ fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), FileFault> {
 
 fn texels(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<Texture, FileFault> {
     let decoded = match (header, map) {
-        (MapHeader::Png(_), Map::BaseColor) => map_io::png_color(path, bytes),
-        (MapHeader::Png(_), _) => map_io::png_scalar(path, bytes),
-        (MapHeader::Exr(_), Map::BaseColor) => map_io::exr_color(path, &bytes),
-        (MapHeader::Exr(_), _) => map_io::exr_scalar(path, &bytes),
+        (MapHeader::Png(_), Map::BaseColor) => texture_io::png_color(path, bytes),
+        (MapHeader::Png(_), _) => texture_io::png_scalar(path, bytes),
+        (MapHeader::Exr(_), Map::BaseColor) => texture_io::exr_color(path, &bytes),
+        (MapHeader::Exr(_), _) => texture_io::exr_scalar(path, &bytes),
     };
     decoded.map_err(|error| {
         let what = match error {

@@ -105,21 +105,3 @@ fn build_folder() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     test.ancestors().nth(3).expect("a test's program lies three folders deep").to_owned()
 }
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod box_room {
-    pub use crate::scenes::{WALLS, box_camera as camera, box_quad as quad, box_room};
-}
-#[doc(hidden)]
-pub mod data {
-    pub use crate::{lpips_weights, report_missing, say_skipped, shared_data};
-}
-#[doc(hidden)]
-pub mod kept_folder {
-    pub use crate::{copy_folder, kept_folder};
-}
-#[doc(hidden)]
-pub mod synthetic_noise {
-    pub use crate::statistics::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
-}

@@ -5,19 +5,19 @@ use std::sync::{Arc, LazyLock};
 
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
-use mateval_baselines::{grey, submission, truth};
+use mateval_baselines::{homogeneous, submission};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
+use mateval_prep::build::finish::finish_again;
 use mateval_prep::build::{BuildOptions, build};
-use mateval_prep::finish::finish_again;
 use mateval_prep::render::{RenderOptions, render};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::Map;
-use mateval_scene::{glb, reference_io};
+use mateval_scene::{glb, reference};
 use mateval_submission::texel_map::TexelMap;
 use mateval_tracer::World;
 
@@ -80,12 +80,12 @@ pub fn dataset() -> &'static Dataset {
 
 /// Writes the submission `gt`.
 pub fn write_truth(out: &Path) {
-    truth::write(dataset(), out, false).unwrap();
+    submission::write_truth(dataset(), out, false).unwrap();
 }
 
 /// Writes the baseline `grey`, whose roughness is the default.
 pub fn write_grey(out: &Path) {
-    grey::write(dataset(), out, false).unwrap();
+    homogeneous::write_grey(dataset(), out, false).unwrap();
 }
 
 /// Writes the truth of the photo lifted to the atlases, the rest by nearest neighbours.
@@ -105,7 +105,7 @@ fn write_lifted(out: &Path, source: &EstimateSource) {
 /// Makes the base colour of a scene's atlases black where the input view does not show them.
 pub fn blacken_unobserved(scene: &SceneFile, folder: &Path) {
     let source = dataset().folder(&scene.id);
-    let world = World::new(Arc::new(reference_io::read(&source).unwrap())).unwrap();
+    let world = World::new(Arc::new(reference::read(&source).unwrap())).unwrap();
     for (at, node) in glb::read(&source.instances()).unwrap().into_iter().enumerate() {
         let path = folder.join(&node.name).join("base_color.png");
         if !path.is_file() {

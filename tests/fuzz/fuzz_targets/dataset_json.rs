@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
-use mateval_scene::reference_io::{LightsFile, ReferenceFile};
+use mateval_scene::reference::{LightsFile, ReferenceFile};
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("scene.json", bytes, |path| {

@@ -2,8 +2,9 @@
 //! Reads a graph, writes it and reads it again, and evaluates it with a derivative in its first parameter.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_procedural::lanes::{LANES, Points};
-use mateval_procedural::limits::Limits;
+use mateval_procedural::program::op::LANES;
+use mateval_procedural::evaluator::Points;
+use mateval_procedural::mtlx::Limits;
 use mateval_procedural::mtlx::{read_text, to_text};
 use mateval_procedural::{Evaluator, Program, Settings};
 

@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 use mateval_scene::TriangleMesh;
 use mateval_scene::submission::Map;
 use mateval_submission::map_file::decode;
-use mateval_submission::submitted_file::SubmittedFile;
+use mateval_submission::files::SubmittedFile;
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((which, bytes)) = bytes.split_first() else { return };

@@ -5,7 +5,7 @@ use libfuzzer_sys::fuzz_target;
 use mateval_scene::Severity;
 use mateval_scene::submission::SUBMISSION;
 use mateval_submission::lint::submission_json;
-use mateval_submission::submission_json::SubmissionJson;
+use mateval_submission::files::SubmissionJson;
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file(SUBMISSION, bytes, |path| {

@@ -20,15 +20,16 @@ use std::sync::Arc;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Psnr;
 use mateval_prep::render::RendererKind;
-use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::compare_file::{self, CompareCounts, VERDICT_FORMAT};
 use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::BuildFolder;
 use mateval_scene::layout::{COMPARE, SceneFolder};
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
+use mateval_scene::render_file;
 use mateval_scene::render_file::RENDER_FILE;
+use mateval_scene::render_file::{CompareCounts, VERDICT_FORMAT};
 use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
-use mateval_scene::{Progress, Report, SceneId, json, reference_io};
+use mateval_scene::{Progress, Report, SceneId, json, reference};
 use mateval_tracer::World;
 
 use self::file::{
@@ -109,7 +110,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
 }
 
 /// The outcomes by scene, as the dataset's `compare.json` holds them.
-fn verdict(file: &CompareFile) -> compare_file::CompareFile {
+fn verdict(file: &CompareFile) -> render_file::CompareFile {
     let mut scenes: BTreeMap<SceneId, CompareCounts> = BTreeMap::new();
     for (scene, _, check) in file.checks() {
         let counts = scenes.entry(scene.clone()).or_default();
@@ -119,7 +120,7 @@ fn verdict(file: &CompareFile) -> compare_file::CompareFile {
             State::TooNoisy | State::Undecided => counts.too_noisy += 1,
         }
     }
-    compare_file::CompareFile {
+    render_file::CompareFile {
         format: VERDICT_FORMAT.to_owned(),
         tool: file.tool.clone(),
         manifest_sha256: file.dataset.manifest_sha256.clone(),
@@ -171,7 +172,7 @@ fn compare_scene(
     out: Option<&Path>,
     progress: Progress<'_>,
 ) -> Result<(SceneComparison, Vec<ViewPreviews>), AuditError> {
-    let reference = Arc::new(reference_io::read(folder)?);
+    let reference = Arc::new(reference::read(folder)?);
     let world = World::new(reference.clone())?;
     let kinds = MaterialKind::of_surfaces(&reference);
     let tile_bound = match kinds.iter().all(|kind| *kind == MaterialKind::Lambert) {
@@ -375,7 +376,7 @@ impl Converted<'_> {
     /// Renders the view with the source's own materials and compares; none where the materials were not converted.
     fn compare(&self, samples: u32, progress: Progress<'_>) -> Result<Option<SourceComparison>, AuditError> {
         let reference = self.world.scene();
-        let Some(source) = reference_io::read_source_materials(self.folder, reference.materials.len())? else {
+        let Some(source) = reference::read_source_materials(self.folder, reference.materials.len())? else {
             return Ok(None);
         };
         let theirs = World::sharing(Arc::new(source.in_scene(reference)), self.world.accel().clone())?;
@@ -411,14 +412,4 @@ impl Converted<'_> {
         let exposure = self.scene.exposure as f32;
         picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|value| (value * exposure).clamp(0.0, 1.0))))
     }
-}
-
-// OLD PATHS, removed after the merge.
-#[doc(hidden)]
-pub mod bounds {
-    pub use super::file::BOUNDS;
-}
-#[doc(hidden)]
-pub mod text {
-    pub use super::report::verdict;
 }

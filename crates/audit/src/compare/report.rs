@@ -8,7 +8,7 @@ use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Normal, Picture};
 use mateval_scene::ViewId;
 use mateval_scene::dataset::SceneFile;
-use mateval_scene::text_table::{Table, row};
+use mateval_scene::progress::{Table, row};
 use minijinja::value::Serde;
 use minijinja::{Environment, context};
 use serde::Serialize;

@@ -22,7 +22,7 @@ use mateval_scene::material::Material;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{Camera, Finding, SceneId, ViewId, reference_io};
+use mateval_scene::{Camera, Finding, SceneId, ViewId, reference};
 use mateval_tracer::RenderSettings;
 
 use self::files::{Element, Remarks, SCENE_FILE, Sheet};
@@ -60,7 +60,7 @@ pub fn export_view(options: &ExportOptions) -> Result<Vec<Finding>, AuditError> 
     };
     let concerns = |path: &str| path.starts_with("ground_truth/reference/") || path == "ground_truth/lights.json";
     dataset.check_files(&options.scene, concerns)?;
-    let scene = reference_io::read(&dataset.folder(&options.scene))?;
+    let scene = reference::read(&dataset.folder(&options.scene))?;
     export(&scene, &view.camera, &RenderSettings { samples, ..Default::default() }, &options.out)
 }
 

@@ -8,11 +8,11 @@ pub mod show;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_scene::dataset::SUPER_CATEGORIES;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::DATASET;
 use mateval_scene::material::MaterialParameter;
 use mateval_scene::open::Dataset;
-use mateval_scene::super_categories::SUPER_CATEGORIES;
 use mateval_scene::{Finding, FindingCount, Role, SceneError, SceneId, Severity, SourceKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -5,8 +5,8 @@
 //! name. The same counts give the same bytes.
 
 use mateval_scene::Severity;
-use mateval_scene::super_categories::SUPER_CATEGORIES;
-use mateval_scene::text_table::{Table, row};
+use mateval_scene::dataset::SUPER_CATEGORIES;
+use mateval_scene::progress::{Table, row};
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;

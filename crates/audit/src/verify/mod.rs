@@ -7,15 +7,15 @@ mod scene;
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_prep::faults::Faults;
 use mateval_prep::scene_meshes;
-use mateval_scene::build_folder::BuildFolder;
+use mateval_prep::scene_meshes::Faults;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use mateval_scene::ids::quoted;
+use mateval_scene::layout::BuildFolder;
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use mateval_scene::material_class::MaterialClassesFile;
+use mateval_scene::material::MaterialClassesFile;
 use mateval_scene::open::{absent_scenes, is_below};
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference_io};
+use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
 
@@ -145,14 +145,10 @@ fn check_targets(root: &Path, dataset: &DatasetFile, absent: &[SceneId], faults:
 
 /// Checks the source's own materials, where there are any. `count` is the number of the scene's materials.
 fn check_source_materials(folder: &SceneFolder, count: usize, faults: &mut Faults) {
-    if folder.source_materials().join(reference_io::SOURCE_MATERIALS).exists() {
-        check_schema::<reference_io::SourceMaterialsFile>(
-            &folder.source_materials(),
-            reference_io::SOURCE_MATERIALS,
-            faults,
-        );
+    if folder.source_materials().join(reference::SOURCE_MATERIALS).exists() {
+        check_schema::<reference::SourceMaterialsFile>(&folder.source_materials(), reference::SOURCE_MATERIALS, faults);
     }
-    faults.read("ground_truth/reference/source", reference_io::read_source_materials(folder, count));
+    faults.read("ground_truth/reference/source", reference::read_source_materials(folder, count));
 }
 
 /// Checks the classes of materials, where there are any: one for each of the source's own parts.
@@ -179,9 +175,9 @@ fn check_scene(root: &Path, folder: &SceneFolder, dataset: &DatasetFile, id: &st
     let Some(meshes) = scene_meshes::check(folder, &scene, faults) else { return };
     let world = match folder.truth().is_dir() {
         true => {
-            check_schema::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
-            check_schema::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
-            let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
+            check_schema::<reference::ReferenceFile>(&folder.reference(), "reference.json", faults);
+            check_schema::<reference::LightsFile>(&folder.truth(), "lights.json", faults);
+            let Some(reference) = faults.read("ground_truth/reference", reference::read(folder)) else { return };
             check_source_materials(folder, reference.materials.len(), faults);
             check_material_classes(folder, &scene, faults);
             scene::check_materials(folder, &scene, faults);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
-use mateval_prep::faults::Faults;
+use mateval_prep::scene_meshes::Faults;
 use mateval_prep::scene_meshes::Meshes;
 use mateval_prep::views::{SeenTriangle, ViewPixel, ViewScene};
 use mateval_scene::dataset::{SceneFile, View};

@@ -5,12 +5,12 @@
 use std::path::Path;
 
 use mateval_image::{LinearRgb, exr_io};
-use mateval_prep::faults::Faults;
+use mateval_prep::scene_meshes::Faults;
 use mateval_scene::dataset::{DatasetFile, Photo, SceneFile};
 use mateval_scene::layout::{INPUT, SCORER_JSON, SceneFolder};
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::render_file::RenderFile;
-use mateval_scene::scorer_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
+use mateval_scene::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_scene::{Finding, RendererId, Severity, json};
 
 use super::scene::check_schema;

@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::DMat3;
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_prep::faults::Faults;
+use mateval_prep::scene_meshes::Faults;
 use mateval_prep::scene_meshes::Meshes;
 use mateval_scene::dataset::{Part, SceneFile, View, WideView};
 use mateval_scene::glb::GlbNode;

@@ -315,7 +315,7 @@ mod tests {
     };
     use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
     use mateval_scene::{Camera, Intrinsics, TriangleMesh, splitmix64};
-    use mateval_testkit::box_room;
+    use mateval_testkit::scenes::{box_camera, box_quad, box_room};
     use mateval_tracer::{RenderSettings, World, aov, render};
 
     use super::room::NO_PART;
@@ -351,7 +351,7 @@ mod tests {
     /// A parallelogram with uvs in metres.
     fn textured(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
         let length = |side: [f32; 3]| side.iter().map(|v| v * v).sum::<f32>().sqrt();
-        let mut mesh = box_room::quad(corner, u, v);
+        let mut mesh = box_quad(corner, u, v);
         let [w, h] = [length(u), length(v)];
         mesh.uvs = Some(vec![Vec2::ZERO, Vec2::new(w, 0.0), Vec2::new(w, h), Vec2::new(0.0, h)]);
         mesh
@@ -388,7 +388,7 @@ mod tests {
             let [x, z] = [numbers.between(0.5, 3.0), numbers.between(0.5, 5.0)];
             more.push(textured([x, 2.2, z], [0.4, 0.0, 0.0], [0.0, 0.0, 0.4]));
         }
-        let mut scene = box_room::box_room(more);
+        let mut scene = box_room(more);
         scene.materials.clear();
         for (k, surface) in scene.surfaces.iter_mut().enumerate() {
             let mesh = &surface.mesh;
@@ -429,7 +429,7 @@ mod tests {
         };
         // Photograph the room as it is, with lamps that the camera sees.
         let intrinsics = Intrinsics::from_fov_x(SIZE[0], SIZE[1], 60_f64.to_radians());
-        let camera = Camera { intrinsics, ..box_room::camera() };
+        let camera = Camera { intrinsics, ..box_camera() };
         let settings = RenderSettings { samples: 64, seed, ..RenderSettings::default() };
         let photo = render(&lit(&|k| radiances[k], true), &camera, &settings, &|_, _| ()).unwrap().picture;
         let world = lit(&|_| [1.0; 3], false);

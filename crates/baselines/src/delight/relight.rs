@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use mateval_image::exr_io::{Precision, read_linear, read_scalar, write_linear};
-use mateval_image::jpeg_io::jpeg_bytes;
+use mateval_image::png_io::jpeg_bytes;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::SceneFile;

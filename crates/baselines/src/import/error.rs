@@ -2,7 +2,7 @@
 
 use mateval_image::ImageError;
 use mateval_scene::findings::shortened;
-use mateval_scene::gltf_error::GltfError;
+use mateval_scene::gltf_file::GltfError;
 use mateval_scene::obj::ObjError;
 use mateval_scene::source_folder::FileFault;
 

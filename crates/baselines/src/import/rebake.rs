@@ -3,8 +3,8 @@
 
 use glam::DVec3;
 use mateval_image::Picture;
-use mateval_scene::triangle::nearest_weights;
-use mateval_scene::uv_atlas::UvAtlas;
+use mateval_scene::mesh::UvAtlas;
+use mateval_scene::mesh::nearest_weights;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use mateval_image::{Mask, Picture};
 use mateval_scene::TriangleMesh;
-use mateval_scene::uv_atlas::UvAtlas;
+use mateval_scene::mesh::UvAtlas;
 use rayon::prelude::*;
 
 use super::materials::{PartMaterial, Residuals, SceneMaterials, completed};

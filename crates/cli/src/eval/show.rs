@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::builder::PossibleValue;
-use mateval_eval::light::rules::Track;
+use mateval_eval::protocol::Track;
 use mateval_eval::result::ResultFile;
-use mateval_eval::result_key::PictureKind;
+use mateval_eval::result::key::PictureKind;
 use mateval_report::explain::{self, ExplainPlan};
-use mateval_report::leaderboard::results_folder::ResultsFolder;
-use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, verified, write};
+use mateval_report::leaderboard::entries::ResultsFolder;
+use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, write};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
@@ -294,8 +294,8 @@ impl LeaderboardArgs {
         };
         let entries = entries::read(&files)?;
         let marked = files.results.iter().zip(&entries.verified);
-        for (path, _) in marked.filter(|(_, mark)| **mark == verified::Verified::Stale) {
-            let sidecar = verified::sidecar(path);
+        for (path, _) in marked.filter(|(_, mark)| **mark == entries::Verified::Stale) {
+            let sidecar = entries::sidecar(path);
             say(&format!(
                 "warning: '{}' verifies an earlier version of the result; run `eval verify` again",
                 sidecar.display()

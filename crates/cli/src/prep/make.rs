@@ -6,9 +6,9 @@ use std::time::Duration;
 use anyhow::{Context as _, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mateval_eval::light::reference::{RELEASE_SAMPLES, ReferenceOptions, make_references};
-use mateval_prep::bring_up_to_date::bring_up_to_date;
 use mateval_prep::build::BuildOptions;
-use mateval_prep::finish::finish_again;
+use mateval_prep::build::finish::bring_up_to_date;
+use mateval_prep::build::finish::finish_again;
 use mateval_prep::perturb::{PerturbOptions, PerturbedScene, perturb};
 use mateval_prep::recipe::MOST_SAMPLES;
 use mateval_prep::render::{BlenderOptions, BlenderProgram, RenderOptions, Renderer, RendererKind};
@@ -16,7 +16,7 @@ use mateval_prep::survey::rules::{RejectionLists, SelectionRules};
 use mateval_prep::survey::selection::SelectionGoal;
 use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, survey};
 use mateval_scene::SceneId;
-use mateval_scene::perturbation::PerturbationKind;
+use mateval_scene::dataset::PerturbationKind;
 use mateval_scene::work_folder::check_free;
 use mateval_sources::front3d::camera_rules::CameraRules;
 
@@ -432,7 +432,7 @@ pub struct FinishArgs {
 impl FinishArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let finish = |progress: mateval_scene::Progress<'_>| {
-            mateval_prep::finish::finish(&self.dataset, &self.without, TOOL, progress)
+            mateval_prep::build::finish::finish(&self.dataset, &self.without, TOOL, progress)
         };
         let dataset = with_progress(finish).context("cannot finish the dataset")?;
         let photos = dataset.photo_renderer.map_or("without photos".to_owned(), |id| format!("photos by {id}"));

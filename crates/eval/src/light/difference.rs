@@ -196,7 +196,7 @@ pub(crate) fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture
 mod tests {
     use mateval_image::Normal;
     use mateval_metrics::mse;
-    use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
+    use mateval_testkit::statistics::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
 
     use crate::light::error::LightMse;
 

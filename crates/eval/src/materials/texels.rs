@@ -174,7 +174,7 @@ mod tests {
     use mateval_scene::material::{ColorInput, Material, MaterialModel};
     use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
     use mateval_scene::{Camera, InstanceId, Intrinsics, SceneId};
-    use mateval_submission::atlas_meshes::AtlasMeshes;
+    use mateval_submission::atlas::AtlasMeshes;
     use mateval_submission::prediction::read_scene;
     use serde_json::json;
 

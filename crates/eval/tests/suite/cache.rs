@@ -11,7 +11,7 @@ use mateval_image::{Picture, Wrap, png_io};
 use serde_json::Value;
 
 use super::sample::{hasty, plan, scored, text, write_truth};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// A submission, its result without any cache, and a cache that a run has filled.
 struct Kept {

@@ -11,7 +11,7 @@ use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 
 use super::sample::{dataset, hasty, plan, scored, write_changed, write_grey, write_truth};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// Kinds of damage to the truth, and their numbers of strengths.
 const KINDS: [(&str, usize); 7] =

@@ -7,19 +7,19 @@ use std::sync::{Arc, LazyLock};
 
 use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Picture};
+use mateval_light::light_fit::FitRules;
 use mateval_light::light_fit::{FitTarget, fit_lights};
 use mateval_light::light_stage::{self, NamedLight};
-use mateval_light::rules::FitRules;
 use mateval_scene::dataset::SceneFile;
-use mateval_scene::{Camera, TriangleMesh, glb, reference_io};
-use mateval_submission::atlas_meshes::AtlasMeshes;
+use mateval_scene::{Camera, TriangleMesh, glb, reference};
+use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
 };
 
 use super::sample::{dataset, hasty, write_truth};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// The furnished room of the sample on its stage, with the prediction `gt`.
 struct Staged {
@@ -43,7 +43,7 @@ fn read(name: &str, scene: &SceneFile) -> (World, Vec<TriangleMesh>, PredictedSc
     let folder = dataset().folder(&scene.id);
     let submission = kept_folder("planted").join(name);
     write_truth(&submission);
-    let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
+    let world = World::new(Arc::new(reference::read(&folder).unwrap())).unwrap();
     let nodes = glb::read(&folder.instances()).unwrap();
     let atlases: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
     let predicted = read_scene(&submission, scene, &AtlasMeshes::in_memory(&atlases)).unwrap();

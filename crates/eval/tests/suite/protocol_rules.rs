@@ -14,12 +14,12 @@ use mateval_eval::score::{ScorePlan, score};
 use mateval_light::light_stage;
 use mateval_scene::Camera;
 use mateval_scene::open::Dataset;
-use mateval_testkit::box_room::{self, box_room, quad};
+use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::World;
 use serde_json::{Value, json};
 
 use super::sample::{dataset, hasty, plan, write_grey};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 use mateval_testkit::sample_dataset::built_with_wide_views;
 
 /// The start of JSON pointers, and a value that the rules below it decide.
@@ -148,11 +148,11 @@ fn headline(protocol: &Protocol) -> Value {
 /// A room with a panel that leans by 6 degrees and one that stands 6 mm before a wall: walls to some rules only.
 fn stage(protocol: &Protocol) -> Value {
     static ROOM: LazyLock<World> = LazyLock::new(|| {
-        let leaning = quad([4.0, 0.0, 5.2], [0.0, 0.0, 0.7], [-0.1, 1.0, 0.0]);
-        let proud = quad([3.994, 1.1, 5.2], [0.0, 0.0, 0.7], [0.0, 1.0, 0.0]);
+        let leaning = box_quad([4.0, 0.0, 5.2], [0.0, 0.0, 0.7], [-0.1, 1.0, 0.0]);
+        let proud = box_quad([3.994, 1.1, 5.2], [0.0, 0.0, 0.7], [0.0, 1.0, 0.0]);
         World::new(Arc::new(box_room(vec![leaning, proud]))).unwrap()
     });
-    let lights = light_stage::lights(&protocol.light.stage, &ROOM, &[2, 3, 4, 5, 6, 7], &[box_room::camera()]);
+    let lights = light_stage::lights(&protocol.light.stage, &ROOM, &[2, 3, 4, 5, 6, 7], &[box_camera()]);
     json!(format!("{lights:?}"))
 }
 

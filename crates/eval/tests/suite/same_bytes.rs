@@ -7,7 +7,7 @@ use mateval_eval::score::{LpipsWeights, ScorePlan};
 use mateval_image::LinearRgb;
 
 use super::sample::{hasty, lpips, plan, scored, text, write_changed, write_grey, write_truth};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// `gt`, `dark` (of the same roughness) and `grey` (of another).
 static SUBMISSIONS: LazyLock<[PathBuf; 3]> = LazyLock::new(|| {

@@ -7,7 +7,7 @@ use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_metrics::{Lpips, Net};
 use mateval_scene::SceneId;
-use mateval_testkit::data::lpips_weights;
+use mateval_testkit::lpips_weights;
 pub use mateval_testkit::sample_dataset::{built, dataset, write_changed, write_grey, write_truth};
 
 /// The network of LPIPS; none where its weights are missing.

@@ -9,7 +9,7 @@ use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::ResultKey;
 use mateval_image::LinearRgb;
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 use super::sample::{hasty, lpips, plan, scored, write_changed, write_grey, write_truth};
 
@@ -35,7 +35,7 @@ fn the_truth_is_exact_at_any_number_of_samples() {
         if let Some(lpips) = &lpips {
             let again = mateval_metrics::Lpips::load(
                 lpips.net(),
-                &mateval_testkit::data::lpips_weights(lpips.net().file_name()).unwrap(),
+                &mateval_testkit::lpips_weights(lpips.net().file_name()).unwrap(),
             );
             plan.lpips = mateval_eval::score::LpipsWeights::Loaded(Box::new(again.unwrap()));
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use mateval_baselines::grey;
+use mateval_baselines::homogeneous;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::{RESULT_FORMAT, ResultFile};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
@@ -15,7 +15,7 @@ use mateval_scene::open::Dataset;
 use serde_json::Value;
 
 use super::sample::built;
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder;
 
 /// A dataset without renders, so that everything in a protocol is measured within seconds.
 struct Scored {
@@ -27,7 +27,7 @@ struct Scored {
 static SCORED: LazyLock<Scored> = LazyLock::new(|| {
     let dataset = Dataset::open(&built()).unwrap();
     let submission = kept_folder("verify").join("grey");
-    grey::write(&dataset, &submission, false).unwrap();
+    homogeneous::write_grey(&dataset, &submission, false).unwrap();
     let plan = ScorePlan {
         dataset: &dataset,
         submissions: vec![&submission],
@@ -138,7 +138,7 @@ fn a_result_of_another_version_is_named_as_such() {
 fn another_texel_is_found() {
     let changed = tempfile::tempdir().unwrap();
     let submission = changed.path().join("grey");
-    grey::write(&SCORED.dataset, &submission, false).unwrap();
+    homogeneous::write_grey(&SCORED.dataset, &submission, false).unwrap();
     // The twin: a copy is the same submission.
     assert!(verified(&SCORED.result, &submission).confirmed);
     let scene = submission.join("scenes/room");

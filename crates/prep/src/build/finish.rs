@@ -12,14 +12,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use mateval_image::store::write_whole;
-use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, PREVIOUS_FORMAT, SceneFile, Target, TargetsFile};
+use mateval_scene::layout::BuildFolder;
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS, is_rendered};
+use mateval_scene::manifest::SceneHashes;
+use mateval_scene::manifest::change_scene;
 use mateval_scene::manifest::{self, sha256_of_bytes, sha256_of_file};
 use mateval_scene::open::check_whole;
 use mateval_scene::render_file::RENDER_FILE;
-use mateval_scene::scene_change::change_scene;
-use mateval_scene::scene_hashes::SceneHashes;
 use mateval_scene::work_folder::{self, remove};
 use mateval_scene::{Progress, RendererId, Report, SceneError, SceneId, json};
 use serde::Deserialize;
@@ -165,7 +165,7 @@ pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepEr
     let entries = std::fs::read_dir(&folder).map_err(PrepError::io("list", &folder))?;
     let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
     let is_stray =
-        |name: &String| !mateval_image::temporary::is_temporary(name) && scenes.iter().all(|id| id.as_str() != name);
+        |name: &String| !mateval_image::store::is_temporary(name) && scenes.iter().all(|id| id.as_str() != name);
     let mut names: Vec<String> = names.filter(is_stray).collect();
     names.sort();
     if names.is_empty() { Ok(()) } else { Err(PrepError::StrayScenes { path: folder, names }) }
@@ -394,8 +394,8 @@ mod tests {
     use std::path::PathBuf;
 
     use mateval_scene::open::Dataset;
-    use mateval_testkit::kept_folder::{copy_folder, kept_folder};
     use mateval_testkit::sample_dataset;
+    use mateval_testkit::{copy_folder, kept_folder};
 
     use crate::render::{RenderOptions, render};
 

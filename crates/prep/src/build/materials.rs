@@ -8,8 +8,8 @@ use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{Picture, Texture, png_io};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{Appearance, Material};
+use mateval_scene::mesh::UvAtlas;
 use mateval_scene::submission::Map;
-use mateval_scene::uv_atlas::UvAtlas;
 use mateval_scene::{Finding, Progress, Report, Severity, TriangleMesh};
 use rayon::prelude::*;
 

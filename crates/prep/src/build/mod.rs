@@ -17,16 +17,16 @@ pub(crate) mod start;
 
 use std::path::Path;
 
-use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SceneSource, SourceFile};
 use mateval_scene::glb::{self, GlbNode};
+use mateval_scene::layout::BuildFolder;
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::material_class::MaterialClassesFile;
+use mateval_scene::manifest::SceneHashes;
+use mateval_scene::material::MaterialClassesFile;
 use mateval_scene::reference::Surface;
 use mateval_scene::scene_cost::{self, Step, TimedStep};
-use mateval_scene::scene_hashes::SceneHashes;
 use mateval_scene::work_folder::{WorkFolder, remove, remove_beside};
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference_io};
+use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference};
 use mateval_sources::source_scene::LicenceText;
 
 use crate::atlas::cache::AtlasCache;
@@ -181,9 +181,9 @@ fn build_scene(
     }
     // The remaining files.
     write_meshes(&plan, folder, &atlases)?;
-    reference_io::write(folder, &plan.scene)?;
+    reference::write(folder, &plan.scene)?;
     if let Some(source) = &plan.source_materials {
-        reference_io::write_source_materials(folder, source)?;
+        reference::write_source_materials(folder, source)?;
     }
     if let Some(parts) = plan.classes.take() {
         let file = MaterialClassesFile { format: FORMAT.to_owned(), parts };

@@ -17,8 +17,8 @@ use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 use mateval_scene::{Finding, InstanceId, InstanceIndex, PartId, PartSetId, Role, Severity, TriangleMesh};
 use mateval_sources::npy::{self, NpyError};
-use mateval_sources::parts::{MAX_PARTS, connected_parts, parts_of_labels};
 use mateval_sources::source_scene::InstanceOrigin;
+use mateval_sources::surface_mesh::{MAX_PARTS, connected_parts, parts_of_labels};
 
 /// More instances or parts than 16 bits can number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -6,8 +6,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::build_folder::{BUILD, BuildFolder};
 use mateval_scene::dataset::{Licence, SceneFile, SourceFile};
+use mateval_scene::layout::{BUILD, BuildFolder};
 use mateval_scene::layout::{DATASET, SceneFolder};
 use mateval_scene::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
 use mateval_scene::{SceneId, json, manifest};

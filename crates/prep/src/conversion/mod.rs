@@ -12,8 +12,8 @@ mod base_color;
 use mateval_scene::material::{
     ColorInput, ConductorIor, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
 };
+use mateval_scene::reference::SourceMaterials;
 use mateval_scene::reference::{Emission, MaterialIndex, ReferenceScene};
-use mateval_scene::source_materials::SourceMaterials;
 use mateval_scene::{Finding, Severity};
 use mateval_tracer::bsdf::ReflectanceMeter;
 use mateval_tracer::repaint::SPECULAR;

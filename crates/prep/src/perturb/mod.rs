@@ -12,13 +12,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mateval_scene::dataset::{DatasetFile, Instance, SceneFile};
+use mateval_scene::dataset::{Perturbation, PerturbationKind, PerturbedGeometry};
 use mateval_scene::glb::{self, GlbNode};
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, part_picture};
 use mateval_scene::open::Dataset;
-use mateval_scene::perturbation::{Perturbation, PerturbationKind, PerturbedGeometry};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::work_folder::{WorkFolder, check_holds_none};
-use mateval_scene::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference_io};
+use mateval_scene::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
@@ -139,7 +139,7 @@ fn write_scene(
     seed: u64,
 ) -> Result<PerturbedScene, PrepError> {
     // The true scene, and the displacement of each instance.
-    let mut reference = reference_io::read(from)?;
+    let mut reference = reference::read(from)?;
     let mut faults = Faults::default();
     let Some(meshes) = scene_meshes::check(from, scene, &mut faults) else {
         return Err(SceneError::Invalid { path: from.path().to_owned(), findings: faults.all }.into());

@@ -5,8 +5,8 @@
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec3};
+use mateval_scene::dataset::PerturbationKind;
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{InstanceId, SceneId, TriangleMesh, splitmix64};
 use mateval_tracer::{Accel, Ray, TracerError};
 

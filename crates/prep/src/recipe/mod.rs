@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use mateval_image::file_kind::{hint, mistaken_for, without_mark};
 use mateval_image::limits::read_at_most;
+use mateval_image::limits::{hint, mistaken_for, without_mark};
 use mateval_scene::ViewId;
 use mateval_scene::dataset::TrueMaterials;
 use mateval_sources::front3d::camera_rules::CameraRules;

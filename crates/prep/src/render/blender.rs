@@ -12,8 +12,8 @@ use std::time::Duration;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_noise::RenderNoise;
-use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference_io};
+use mateval_scene::render_file::RenderNoise;
+use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference};
 
 use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
 use crate::blender::{
@@ -111,7 +111,7 @@ impl BlenderScene<'_> {
         if work.exists() {
             std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?;
         }
-        let reference = reference_io::read(&folder)?;
+        let reference = reference::read(&folder)?;
         let parts = scene_meshes::part_values(&folder, &scene)?;
         let mut failure = None;
         for attempt in 1..=self.options.attempts.max(1) {

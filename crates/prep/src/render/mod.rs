@@ -15,13 +15,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mateval_image::{ImageError, Picture, exr_io, png_io};
-use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, View};
+use mateval_scene::layout::BuildFolder;
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder};
 use mateval_scene::open::chosen_ids;
 use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_noise::RenderNoise;
-use mateval_scene::{Progress, Report, SceneId, json, reference_io};
+use mateval_scene::render_file::RenderNoise;
+use mateval_scene::{Progress, Report, SceneId, json, reference};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
@@ -173,7 +173,7 @@ fn render_scene(
         }
         let world = match &mut world {
             Some(world) => world,
-            none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))?),
+            none => none.insert(World::new(Arc::new(reference::read(&folder)?))?),
         };
         let step = format!("view {}", view.id);
         let shown = |done: usize, all: usize| progress(Report::step(&step, done, all));

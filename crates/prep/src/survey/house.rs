@@ -225,7 +225,7 @@ impl SurveyFolder {
         let lease = Lease::take(&self.lease("whole"), "the survey")?;
         let entries = std::fs::read_dir(self.lease("houses")).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        for name in names.filter(|name| !mateval_image::temporary::is_temporary(name)) {
+        for name in names.filter(|name| !mateval_image::store::is_temporary(name)) {
             lease::check_free(&self.lease(&format!("houses/{name}")), &format!("house '{name}'"))?;
         }
         Ok(lease)

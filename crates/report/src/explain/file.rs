@@ -1,6 +1,6 @@
 //! The explanation of one scene, as `mateval eval explain --format json` prints it.
 
-use mateval_eval::result_key::{PictureKind, Views};
+use mateval_eval::result::key::{PictureKind, Views};
 use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

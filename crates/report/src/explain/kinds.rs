@@ -26,7 +26,7 @@
 
 use std::collections::BTreeMap;
 
-use mateval_eval::shown_scene::SceneAlbedo;
+use mateval_eval::shown::SceneAlbedo;
 use mateval_image::{LinearRgb, Picture};
 
 use super::file::KindShares;

@@ -15,12 +15,12 @@ pub mod text;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_eval::metric::Metric;
-use mateval_eval::open_scene::scored_views;
 use mateval_eval::protocol::SCORER_VERSION;
+use mateval_eval::result::key::Metric;
+use mateval_eval::result::key::{PictureKind, ResultKey};
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_eval::result_key::{PictureKind, ResultKey};
-use mateval_eval::shown_scene::{SceneAlbedo, scene_albedo};
+use mateval_eval::scene::scored_views;
+use mateval_eval::shown::{SceneAlbedo, scene_albedo};
 use mateval_image::store::write_whole;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, png_io};
@@ -337,7 +337,7 @@ mod tests {
 
     use mateval_eval::protocol::Protocol;
     use mateval_eval::result::InstancePixelErrors;
-    use mateval_eval::result_key::Views;
+    use mateval_eval::result::key::Views;
     use mateval_scene::InstanceId;
 
     use super::file::KindShares;

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use mateval_eval::alignment::scaled;
-use mateval_eval::measure::{Albedo, albedo_mse};
+use mateval_eval::materials::score::scaled;
+use mateval_eval::materials::score::{Albedo, albedo_mse};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result_key::{PictureKind, Views};
-use mateval_eval::shown_scene::SceneAlbedo;
+use mateval_eval::result::key::{PictureKind, Views};
+use mateval_eval::shown::SceneAlbedo;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::{MetricError, Psnr};
 use mateval_scene::{InstanceId, SceneId};

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use mateval_scene::ViewId;
-use mateval_scene::text_table::Table;
+use mateval_scene::progress::Table;
 
-use mateval_eval::result_key::{PictureKind, Views};
+use mateval_eval::result::key::{PictureKind, Views};
 
 use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
 use super::scores::{LIGHTS, WORST};

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile, TracerCheck};
-use mateval_eval::result_key::ResultKey;
 use mateval_scene::{SceneId, json};
 use minijinja::context;
 use minijinja::value::Serde;

@@ -3,12 +3,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_eval::metric::Metric;
 use mateval_eval::result::PictureValues;
-use mateval_eval::result_key::PictureName;
+use mateval_eval::result::key::Metric;
+use mateval_eval::result::key::PictureName;
+use mateval_scene::dataset::PerturbationKind;
 use mateval_scene::dataset::WideView;
 use mateval_scene::layout::INPUT;
-use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{SceneId, ViewId};
 use minijinja::context;
 use minijinja::value::Serde;
@@ -280,7 +280,7 @@ fn rounded(place: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use mateval_eval::result_key::{PictureKind, Region};
+    use mateval_eval::result::key::{PictureKind, Region};
 
     use super::*;
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_eval::EvalError;
+use mateval_eval::result::key::{Region, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
-use mateval_eval::result_key::{Region, Surfaces};
 use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::findings::shortened;

@@ -2,7 +2,7 @@
 
 use super::entries::Verified;
 use crate::ranking::file::Ranking;
-use mateval_eval::result_key::ResultKey;
+use mateval_eval::result::key::ResultKey;
 use mateval_scene::submission::Cost;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use mateval_eval::metric::Metric;
 use mateval_eval::result::InstancePixelErrors;
-use mateval_eval::result_key::{PictureKind, ResultKey, Views};
+use mateval_eval::result::key::Metric;
+use mateval_eval::result::key::{PictureKind, ResultKey, Views};
 use mateval_scene::SceneId;
 use minijinja::context;
 use minijinja::value::Serde;

@@ -96,20 +96,6 @@ fn site(board: &Board<'_>) -> Site {
     }
 }
 
-// OLD PATHS, removed after the merge. They are paths below this module, so that lib.rs cannot hold them.
-#[doc(hidden)]
-pub mod errata {
-    pub use super::entries::ErrataFile;
-}
-#[doc(hidden)]
-pub mod results_folder {
-    pub use super::entries::ResultsFolder;
-}
-#[doc(hidden)]
-pub mod verified {
-    pub use super::entries::{Verified, sidecar};
-}
-
 #[cfg(test)]
 mod tests {
     //! A small site of invented results; tests in a browser are in `tests/site`.

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use mateval_eval::light::true_maps::TruthMaterial;
-use mateval_image::jpeg_io::jpeg_bytes;
+use mateval_eval::truth::true_material;
 use mateval_image::limits::read_at_most;
+use mateval_image::png_io::jpeg_bytes;
 use mateval_image::store::write_whole;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, Texture};
@@ -115,13 +115,8 @@ fn truth<'a>(from: &Submissions<'_>, scene: &'a SceneFile) -> Result<BTreeMap<&'
         let size = instance.atlas.as_ref().map(|atlas| atlas.size as usize);
         // Scoring has already refused other sizes.
         let Some(size) = size.filter(|size| MAP_SIZES.contains(size)) else { continue };
-        let truth = TruthMaterial::read(&folder, &instance.id, size)?;
-        let texture = |map| match map {
-            Map::BaseColor => &truth.base_color,
-            Map::Roughness => &truth.roughness,
-            Map::Metallic => &truth.metallic,
-        };
-        maps.insert(&instance.id, room_maps(texture));
+        let truth = true_material(&folder, &instance.id, size)?;
+        maps.insert(&instance.id, room_maps(|map| truth.texture(map)));
     }
     Ok(maps)
 }

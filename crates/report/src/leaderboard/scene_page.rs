@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::io::Read as _;
 
 use flate2::read::GzDecoder;
-use mateval_eval::result_key::PictureKind;
+use mateval_eval::result::key::PictureKind;
 use mateval_scene::SceneId;
 use mateval_scene::layout::INPUT;
 use minijinja::context;

@@ -6,8 +6,8 @@ use mateval_scene::SceneId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use mateval_eval::metric::Better;
-use mateval_eval::result_key::ResultKey;
+use mateval_eval::result::key::Better;
+use mateval_eval::result::key::ResultKey;
 
 /// Differences with a corrected p-value below this are significant.
 pub(super) const LEVEL: f64 = 0.05;

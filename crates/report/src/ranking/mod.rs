@@ -10,8 +10,8 @@ mod key_ranking;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_eval::result_key::ResultKey;
 use mateval_scene::SceneId;
 use mateval_scene::submission::Map;
 use rayon::prelude::*;
@@ -264,12 +264,12 @@ fn left_out(result: &ResultFile, scores: &ProtocolResult) -> BTreeSet<SceneId> {
 pub(crate) mod tests {
     //! Rankings of simulated leaderboards, whose true means are known.
 
-    use mateval_eval::means::means;
-    use mateval_eval::metric::Metric;
     use mateval_eval::protocol::Protocol;
+    use mateval_eval::result::key::Metric;
+    use mateval_eval::result::key::{PictureKind, Region, Views};
+    use mateval_eval::result::means::means;
     use mateval_eval::result::{InstanceTexelErrors, PictureValues, RESULT_FORMAT, SubmissionId, TexelErrors};
-    use mateval_eval::result_key::{PictureKind, Region, Views};
-    use mateval_scene::dataset_id::DatasetId;
+    use mateval_scene::open::DatasetId;
     use mateval_scene::{Finding, InstanceId, Severity, ViewId, splitmix64};
 
     use super::bootstrap::{Clusters, duels, intervals};

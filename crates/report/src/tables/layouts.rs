@@ -1,7 +1,7 @@
 //! The tables and their columns, and the numbers that cells can hold.
 
-use mateval_eval::metric::{Better, Metric, NumberStyle};
-use mateval_eval::result_key::{PictureKind, PictureName, ResultKey, Surfaces, Views};
+use mateval_eval::result::key::{Better, Metric, NumberStyle};
+use mateval_eval::result::key::{PictureKind, PictureName, ResultKey, Surfaces, Views};
 
 /// How the rows of a table are grouped; every group has one row for each method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use mateval_eval::metric::{Better, Metric};
+use mateval_eval::result::key::{Better, Metric};
+use mateval_eval::result::key::{PictureKind, PictureName, ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
-use mateval_eval::result_key::{PictureKind, PictureName, ResultKey, Views};
 use mateval_metrics::Psnr;
 use mateval_scene::{SceneId, SourceKind};
 

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::dataset_id::DatasetId;
+use mateval_scene::open::DatasetId;
 use mateval_scene::{InstanceId, SceneId};
 
 use super::*;
-use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result::key::Metric;
+use mateval_eval::result::key::{PictureKind, ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId};
-use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 
 fn scene(name: &str) -> SceneId {
     SceneId::new(name).unwrap()

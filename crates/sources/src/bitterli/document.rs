@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use mateval_image::file_kind::{hint, without_mark};
+use mateval_image::limits::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 

@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
-use mateval_image::file_kind::{hint, without_mark};
+use mateval_image::limits::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};

@@ -6,7 +6,7 @@ use mateval_image::Texels;
 use mateval_scene::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::{Emission, EmissionMap, SurfaceIndex};
 use mateval_scene::{Severity, obj};
-use mateval_testkit::data::shared_data;
+use mateval_testkit::shared_data;
 use proptest::prelude::*;
 
 use super::*;

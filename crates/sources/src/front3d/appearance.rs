@@ -7,10 +7,10 @@ use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::Severity;
 use mateval_scene::findings::shortened;
+use mateval_scene::material::MaterialClass;
 use mateval_scene::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
-use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::{MaterialIndex, SourceTexture};
 use mateval_scene::source_folder::FileFault;
 

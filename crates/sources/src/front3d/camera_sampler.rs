@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{TriangleMesh, triangle};
+use mateval_scene::{TriangleMesh, mesh};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
@@ -346,7 +346,7 @@ fn distance_to_mesh(mesh: &TriangleMesh, from: Vec3, enough: f32) -> f32 {
         let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
         if (from.clamp(low, high) - from).length() < nearest {
             let corners = corners.map(|corner| corner.as_dvec3());
-            nearest = nearest.min(triangle::distance(corners, from.as_dvec3()) as f32);
+            nearest = nearest.min(mesh::triangle_distance(corners, from.as_dvec3()) as f32);
         }
     }
     nearest

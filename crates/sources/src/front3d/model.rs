@@ -7,11 +7,11 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use mateval_image::texture_io::read_texture_and_alpha;
 use mateval_image::{Texture, Wrap};
+use mateval_scene::dataset::SUPER_CATEGORIES;
 use mateval_scene::findings::shortened;
-use mateval_scene::material_class::MaterialClass;
+use mateval_scene::material::MaterialClass;
 use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits, ObjMesh};
 use mateval_scene::source_folder::{LookedFor, SourceFolder};
-use mateval_scene::super_categories::SUPER_CATEGORIES;
 use mateval_scene::{Severity, TriangleMesh};
 use serde_json::Value;
 

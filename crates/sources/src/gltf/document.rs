@@ -3,9 +3,9 @@
 //! (RFC 6901).
 
 use gltf::json::validation;
-use mateval_image::file_kind::without_mark;
+use mateval_image::limits::without_mark;
 use mateval_scene::findings::shortened;
-use mateval_scene::gltf_error::GltfError;
+use mateval_scene::gltf_file::GltfError;
 use mateval_scene::gltf_file::{self, GltfFile, INSTANCING, json_of};
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 use serde::Deserialize;

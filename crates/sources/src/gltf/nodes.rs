@@ -10,9 +10,9 @@ use gltf::scene::Transform;
 use mateval_scene::TriangleMesh;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::findings::shortened;
-use mateval_scene::gltf_accessor::{indices, numbers};
-use mateval_scene::gltf_error::GltfError;
+use mateval_scene::gltf_file::GltfError;
 use mateval_scene::gltf_file::INSTANCING;
+use mateval_scene::gltf_file::{indices, numbers};
 use mateval_scene::reference::{Emission, Surface, SurfaceIndex};
 use serde_json::Value;
 

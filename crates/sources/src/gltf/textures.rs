@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use mateval_image::file_kind::hint;
+use mateval_image::limits::hint;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_scene::Severity;
 use mateval_scene::findings::shortened;
-use mateval_scene::gltf_accessor::view_bytes;
+use mateval_scene::gltf_file::view_bytes;
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;

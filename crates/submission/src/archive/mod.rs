@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use mateval_image::file_kind::hint;
+use mateval_image::limits::hint;
 use mateval_scene::submission::SUBMISSION;
 
 use crate::error::SubmissionError;

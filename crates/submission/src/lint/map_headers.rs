@@ -2,8 +2,8 @@
 
 use crate::error::{note, warning};
 use crate::map_file::{MapFile, MapHeader};
-use mateval_image::exr_header::{ExrChannel, ExrHeader, ExrNumber};
-use mateval_image::png_header::{PngColor, PngHeader};
+use mateval_image::exr_io::{ExrChannel, ExrHeader, ExrNumber};
+use mateval_image::png_io::{PngColor, PngHeader};
 use mateval_image::{Texels, Texture};
 use mateval_scene::Finding;
 use mateval_scene::findings::shortened;

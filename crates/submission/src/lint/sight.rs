@@ -12,7 +12,7 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::SurfaceIndex;
-use mateval_scene::{Camera, TriangleMesh, plain_instances};
+use mateval_scene::{Camera, TriangleMesh, reference};
 use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
@@ -115,7 +115,7 @@ impl<'a> Eye<'a> {
         if let Some(found) = sizes.into_iter().find(|size| *size != expected) {
             return Err(unsound(folder, SceneFault::PictureSize { expected, found }));
         }
-        let world = World::new(Arc::new(plain_instances::read(folder, scene)?))?;
+        let world = World::new(Arc::new(reference::read_plain(folder, scene)?))?;
         Ok(Self { world, scene, camera: &view.camera, valid, ids, photo })
     }
 

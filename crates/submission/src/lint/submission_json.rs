@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use mateval_image::file_kind::{hint, without_mark};
+use mateval_image::limits::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
 use mateval_scene::{Finding, Severity};
@@ -215,9 +215,9 @@ fn is_unprintable(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mateval_scene::perturbation::{Perturbation, PerturbationKind};
-    use mateval_scene::stored_encoding::StoredEncoding;
+    use mateval_scene::dataset::{Perturbation, PerturbationKind};
     use mateval_scene::submission::Cost;
+    use mateval_scene::submission::StoredEncoding;
     use serde_json::json;
 
     /// The codes of what is found in a folder with this `submission.json`.

@@ -350,7 +350,7 @@ fn pictures_are_those_stored() {
     let scene = Arc::new(scene(1.0));
     for instructions in [InstructionSet::Avx2, InstructionSet::Portable] {
         let Some(world) = world(&scene, instructions) else {
-            mateval_testkit::data::say_skipped(&format!("this machine has no {instructions:?}"));
+            mateval_testkit::say_skipped(&format!("this machine has no {instructions:?}"));
             continue;
         };
         for threads in [1, 2, 7] {

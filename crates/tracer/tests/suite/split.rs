@@ -7,7 +7,7 @@ use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SurfaceIndex};
 use mateval_scene::{Camera, Intrinsics};
-use mateval_testkit::box_room;
+use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::aov::hit_through;
 use mateval_tracer::error::{RequestFault, TracerError};
 use mateval_tracer::{AssumedSurfaces, LightBasis, PhotoCache, RenderSettings, SplitLight, World, render, split_light};
@@ -19,8 +19,8 @@ const SURFACES: usize = 8;
 
 /// A room of one colour with two lamps that the camera does not see.
 fn room() -> ReferenceScene {
-    let lamp = |x| box_room::quad([x, 2.3, 1.0], [0.6, 0.0, 0.0], [0.0, 0.0, 0.6]);
-    let mut scene = box_room::box_room(vec![lamp(0.5), lamp(3.0)]);
+    let lamp = |x| box_quad([x, 2.3, 1.0], [0.6, 0.0, 0.0], [0.0, 0.0, 0.6]);
+    let mut scene = box_room(vec![lamp(0.5), lamp(3.0)]);
     scene.materials[0] = Material {
         name: String::new(),
         model: MaterialModel::Principled {
@@ -49,7 +49,7 @@ fn room() -> ReferenceScene {
 }
 
 fn view() -> Camera {
-    Camera { intrinsics: Intrinsics::from_fov_x(32, 18, 60_f64.to_radians()), ..box_room::camera() }
+    Camera { intrinsics: Intrinsics::from_fov_x(32, 18, 60_f64.to_radians()), ..box_camera() }
 }
 
 fn settings(samples: u32) -> RenderSettings {

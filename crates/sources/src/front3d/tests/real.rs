@@ -2,7 +2,7 @@
 
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::material::{ColorInput, MaterialModel};
-use mateval_testkit::data::shared_data;
+use mateval_testkit::shared_data;
 use mateval_tracer::World;
 
 use super::*;
