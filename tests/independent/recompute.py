@@ -133,7 +133,7 @@ def light(folder, valid):
         k = np.clip(np.clip(halves[other], 0, 1)[valid].sum() / expected, 0.1, 10) if expected > 0 else 1.0
         scaled = k * ratio * reference
         p = np.clip(exr(folder / f"guided_{other}.exr"), scaled / 2, 2 * scaled)
-        s = np.where(p >= 1, 0, slope(np.clip(p, 0.002, 1)))
+        s = np.where(p >= 1, 0, slope(np.minimum(p, 1)))
         p = np.clip(p, 0, 1)
         x.append(encoded(p) + s * (halves[half] - p) - encoded(reference))
         u.append(s * (quarters[2 * half] - quarters[2 * half + 1]) / 2)

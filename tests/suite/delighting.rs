@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use mateval_eval::materials::score::{channel_scales, scaled};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
+use mateval_metrics::alignment::{channel_scales, scaled};
 use mateval_metrics::{Psnr, mse};
 use mateval_testkit::{copy_folder, kept_folder};
 

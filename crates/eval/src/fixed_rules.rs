@@ -102,14 +102,15 @@ fixed_rules! {
     fit_step_share: f64 = light_fit::STEP_SHARE,
     /// Fitted radiances below this, relative to the target's mean, may become 0.
     fit_zero_below: f64 = light_fit::ZERO_BELOW,
-    /// The number of passes of the filter that removes noise from what SSIM and LPIPS compare.
-    shown_passes: u32 = noise_filter::PASSES,
+    /// The number of passes of the filter that removes noise from the pivot of a difference, and from what SSIM, LPIPS and FLIP
+    /// compare.
+    filter_passes: u32 = noise_filter::PASSES,
     /// The difference between pixels at which that filter counts them a quarter, in standard deviations of the noise.
-    shown_deviations: f32 = noise_filter::DEVIATIONS,
+    filter_deviations: f32 = noise_filter::DEVIATIONS,
     /// The least cosine between the normals of pixels that it averages.
-    shown_least_cosine: f32 = noise_filter::LEAST_COSINE,
+    filter_least_cosine: f32 = noise_filter::LEAST_COSINE,
     /// The weights of that filter along a row or column, by distance.
-    shown_kernel: [f32; 4] = noise_filter::KERNEL,
+    filter_kernel: [f32; 4] = noise_filter::KERNEL,
     /// The smallest share of the light samples that a light group gets.
     least_group_share: f64 = group_shares::LEAST_SHARE,
     /// The share of the light samples that is drawn without regard to distance.

@@ -21,7 +21,6 @@
 
 pub mod error;
 pub mod fixed_rules;
-pub mod mask_rule;
 pub mod protocol;
 pub mod result;
 pub mod scene;
@@ -29,7 +28,6 @@ pub mod score;
 pub mod shown;
 pub mod truth;
 pub mod verify;
-pub mod word_enum;
 
 pub mod materials {
     //! Submissions' maps compared with the true ones, without light.

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::fixed_rules::FixedRules;
-use crate::mask_rule::MaskRule;
 use crate::result::key::{HEADLINE, PAPER_HEADLINE, PictureKind, ResultKey};
+use mateval_metrics::mask_rule::MaskRule;
 
 /// Colour space in which MSE and PSNR of albedo are taken. SSIM and LPIPS always see sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -9,10 +9,12 @@ use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::light::lighting::{FittedRadiances, LightingName};
+use crate::light::lighting::LightingName;
 use crate::protocol::Protocol;
 use crate::result::key::{Metric, PictureKind, PictureName, Region, ResultKey, Views};
-use crate::word_enum::{UnknownWord, by_text};
+use mateval_light::light_fit::FittedRadiances;
+use mateval_scene::by_text;
+use mateval_scene::word_enum::UnknownWord;
 
 pub mod key;
 pub mod means;

@@ -18,13 +18,14 @@ use serde::{Deserialize, Serialize};
 use crate::error::EvalError;
 use crate::light::difference::base_color_ratio;
 use crate::light::error::LightMse;
-use crate::light::lighting::{FittedRadiances, LightingName};
+use crate::light::lighting::LightingName;
 use crate::light::reference::StoredReference;
 use crate::protocol::Protocol;
 use crate::result::key::{PictureKind, PictureName, Region, ResultKey, Surfaces, Views};
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValues};
 use crate::shown::PicturesDir;
 use crate::truth::ViewTruth;
+use mateval_light::light_fit::FittedRadiances;
 
 /// The views of the scene that `targets.json` names, in the scene's order; at least one.
 pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {

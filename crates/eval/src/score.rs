@@ -327,14 +327,14 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
     let mut findings = Vec::new();
     let expected = &plan.dataset.file.manifest_sha256;
     if file.dataset_manifest_sha256 != *expected {
-        findings.push(Finding {
-            severity: Severity::Warning,
-            code: "other_dataset".to_owned(),
-            file: SUBMISSION.to_owned(),
-            place: "/dataset_manifest_sha256".to_owned(),
-            message: format!("made for the dataset {}, scored on {expected}", file.dataset_manifest_sha256),
-            action: "scored nevertheless; make the submission again for this dataset".to_owned(),
-        });
+        findings.push(Finding::new(
+            Severity::Warning,
+            "other_dataset",
+            SUBMISSION,
+            "/dataset_manifest_sha256",
+            format!("made for the dataset {}, scored on {expected}", file.dataset_manifest_sha256),
+            "scored nevertheless; make the submission again for this dataset",
+        ));
     }
     Ok(Entry { file, findings, files: vec![hashed], scores: vec![Vec::new(); plan.protocols.len()] })
 }
@@ -428,26 +428,28 @@ fn tracer_check(dataset: &Dataset) -> Result<Option<TracerCheck>, EvalError> {
 
 /// The finding about a scene with a photo from elsewhere.
 fn unknown_light(scene: &SceneFile) -> Finding {
-    Finding {
-        severity: Severity::Note,
-        code: "unknown_light".to_owned(),
-        file: format!("scenes/{}/scene.json", scene.id),
-        place: "/photo".to_owned(),
-        message: "the input picture is a photo from elsewhere, and the true light of the scene is not known".to_owned(),
-        action: "scored its materials and not its light".to_owned(),
-    }
+    Finding::new(
+        Severity::Note,
+        "unknown_light",
+        format!("scenes/{}/scene.json", scene.id),
+        "/photo",
+        "the input picture is a photo from elsewhere, and the true light of the scene is not known",
+        "scored its materials and not its light",
+    )
 }
 
 /// A finding for each scene in which some of the prediction's light was not finite.
 fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Finding> {
     let lost = scores.iter().filter(|(_, score)| score.not_finite > 0);
-    lost.map(|(scene, score)| Finding {
-        severity: Severity::Warning,
-        code: "not_finite_light".to_owned(),
-        file: format!("scenes/{scene}"),
-        place: String::new(),
-        message: format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite),
-        action: "they count as no light; please report this submission".to_owned(),
+    lost.map(|(scene, score)| {
+        Finding::new(
+            Severity::Warning,
+            "not_finite_light",
+            format!("scenes/{scene}"),
+            "",
+            format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite),
+            "they count as no light; please report this submission",
+        )
     })
     .collect()
 }
@@ -462,14 +464,14 @@ fn not_predicted(files: &[HashedFile]) -> Vec<Map> {
 }
 
 fn not_predicted_finding(map: Map) -> Finding {
-    Finding {
-        severity: Severity::Note,
-        code: "not_predicted".to_owned(),
-        file: SUBMISSION.to_owned(),
-        place: String::new(),
-        message: format!("the submission holds no {} of any scored instance", map.stem()),
-        action: "it has no value; under light it is rendered as the default".to_owned(),
-    }
+    Finding::new(
+        Severity::Note,
+        "not_predicted",
+        SUBMISSION,
+        "",
+        format!("the submission holds no {} of any scored instance", map.stem()),
+        "it has no value; under light it is rendered as the default",
+    )
 }
 
 /// The metrics that lack weights or renders.

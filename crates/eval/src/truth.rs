@@ -59,8 +59,10 @@ impl ViewTruth {
             size(&specular),
         ];
         check_sizes(view, &sizes)?;
+        // Masks of untrusted datasets may hold more than the valid pixels.
         let both = intersection(&specular, &truth.valid);
-        Ok(Self { specular: both.pixels().contains(&true).then_some(both), ..truth })
+        let unobserved = truth.unobserved.as_ref().map(|mask| intersection(mask, &truth.valid));
+        Ok(Self { specular: both.pixels().contains(&true).then_some(both), unobserved, ..truth })
     }
 }
 

@@ -125,14 +125,14 @@ fn to_value(value: impl Serialize) -> Value {
 }
 
 fn finding(file: &str, difference: &Difference) -> Finding {
-    Finding {
-        severity: Severity::Error,
-        code: "differs".to_owned(),
-        file: file.to_owned(),
-        place: difference.place.clone(),
-        message: format!("the result states {}, computed again it is {}", difference.said, difference.found),
-        action: "the result was changed, or made by another version; score it again".to_owned(),
-    }
+    Finding::new(
+        Severity::Error,
+        "differs",
+        file,
+        difference.place.clone(),
+        format!("the result states {}, computed again it is {}", difference.said, difference.found),
+        "the result was changed, or made by another version; score it again",
+    )
 }
 
 /// Everything that has changed; numbers are computed again only if this is empty. Fails if the result holds LPIPS and its

@@ -162,10 +162,57 @@ impl TwoStreamFit {
         self.combined(|a, b| 0.5 * (a - b))
     }
 
+    /// What the fit found, for lights of these names.
+    pub fn radiances(&self, names: &[String], stage: bool) -> FittedRadiances {
+        let mean = |of: &dyn Fn(&LightFit) -> f64| {
+            self.streams.iter().map(|fit| of(fit) / fit.squares.max(1) as f64 / 2.0).sum()
+        };
+        let lights = names.iter().zip(self.weights().into_iter().zip(self.spread()));
+        FittedRadiances {
+            stage,
+            lights: lights
+                .map(|(light, (radiance, spread))| FittedRadiance { light: light.clone(), radiance, spread })
+                .collect(),
+            mean_absolute_error: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].misfit)),
+            ridge: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].ridge)),
+            lower_bound: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].bound)),
+        }
+    }
+
     fn combined(&self, combine: fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
         let pairs = self.streams[0].weights.iter().zip(&self.streams[1].weights);
         pairs.map(|(a, b)| [0, 1, 2].map(|channel| combine(a[channel], b[channel]))).collect()
     }
+}
+
+/// Radiances fitted to the input view: the mean of two fits to independent streams of samples, each with the proof that no
+/// other radiances fit better.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedRadiances {
+    /// Whether they belong to a light stage; otherwise they multiply the radiances of the scene's own emitters.
+    pub stage: bool,
+    /// The radiance of each light.
+    pub lights: Vec<FittedRadiance>,
+    /// Mean absolute difference of the averaged pictures, linear, for each channel; of both fits. Where the photo is clipped,
+    /// only missing light counts.
+    pub mean_absolute_error: [f64; 3],
+    /// What the ridge adds to that error, mean of both fits.
+    pub ridge: [f64; 3],
+    /// Lower bound of their sum, mean of both fits: no other radiances can have less.
+    pub lower_bound: [f64; 3],
+}
+
+/// One light's radiance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedRadiance {
+    /// The light's name.
+    pub light: String,
+    /// Linear Rec. 709.
+    pub radiance: [f64; 3],
+    /// Half the difference between both fits: a sample of the noise of `radiance`.
+    pub spread: [f64; 3],
 }
 
 /// Fits two bases of the same lights, which come from independent samples. Fails as [`fit_lights`] does.

@@ -69,6 +69,19 @@ impl FindingCount {
 }
 
 impl Finding {
+    /// A finding, its texts in the order of the fields.
+    pub fn new(
+        severity: Severity,
+        code: &str,
+        file: impl Into<String>,
+        place: impl Into<String>,
+        message: impl Into<String>,
+        action: impl Into<String>,
+    ) -> Self {
+        let code = code.to_owned();
+        Self { severity, code, file: file.into(), place: place.into(), message: message.into(), action: action.into() }
+    }
+
     /// All findings, each after a line break and two blanks.
     pub fn list(findings: &[Self]) -> String {
         findings.iter().fold(String::new(), |mut text, finding| {

@@ -29,6 +29,7 @@ pub mod source_folder;
 pub mod specular_glossiness;
 pub mod splitmix64;
 pub mod submission;
+pub mod word_enum;
 pub mod work_folder;
 
 pub use camera::{Camera, Intrinsics};

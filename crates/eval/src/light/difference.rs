@@ -11,7 +11,7 @@
 //! F_o = filter(m_o - g R), by the noise of its quarters
 //! k_o = sum clip(m_o, 0, 1) / sum clip(r R, 0, 1), each value clipped, over the valid pixels and channels, within 0.1 to 10
 //! p_h = g R + F_o, limited to k_o r R / 2 ... 2 k_o r R
-//! s_h = f'(clip(p_h, 0.002, 1)), 0 where p_h >= 1;   p'_h = clip(p_h, 0, 1)
+//! s_h = f'(p_h), 0 where p_h >= 1;   p'_h = clip(p_h, 0, 1)
 //! X_h = f(p'_h) + s_h (m_h - p'_h) - f(R);   u_h = s_h times half the difference of the quarters
 //! ```
 //!
@@ -46,8 +46,6 @@ pub struct DifferenceRules {
     pub scale_range: [f64; 2],
     /// The pivot lies between k r R divided by this and k r R times this.
     pub pivot_factor: f64,
-    /// The smallest value whose slope of the curve counts.
-    pub least_slope_at: f64,
 }
 
 /// The constants of every protocol.
@@ -58,7 +56,6 @@ pub const DIFFERENCE: DifferenceRules = DifferenceRules {
     most_guide: 2.0,
     scale_range: [0.1, 10.0],
     pivot_factor: 2.0,
-    least_slope_at: 0.002,
 };
 
 /// What is known about a prediction's view without noise. All pictures have one size.
@@ -114,7 +111,7 @@ pub fn encoded(value: f64) -> f64 {
     f64::from(srgb_from_linear(value.min(1.0) as f32))
 }
 
-/// f' of a value from 0 to 1.
+/// f' of a value below 1.
 fn slope(value: f64) -> f64 {
     if value <= 0.0031308 { 12.92 } else { 1.055 / 2.4 * libm::pow(value, 1.0 / 2.4 - 1.0) }
 }
@@ -169,13 +166,13 @@ fn tangent(
     scale: f64,
     guide: &ViewGuide<'_>,
 ) -> [Picture<SrgbRgb>; 2] {
-    let DifferenceRules { pivot_factor, least_slope_at, .. } = DIFFERENCE;
+    let DifferenceRules { pivot_factor, .. } = DIFFERENCE;
     let value = |at: usize, c: usize| -> [f32; 2] {
         let of = |picture: &Picture<LinearRgb>| f64::from(picture.pixels()[at].0[c]);
         let reference = of(guide.reference);
         let expected = scale * of(guide.ratio) * reference;
         let p = of(pivot).clamp(expected / pivot_factor, expected * pivot_factor);
-        let slope = if p >= 1.0 { 0.0 } else { slope(p.clamp(least_slope_at, 1.0)) };
+        let slope = if p >= 1.0 { 0.0 } else { slope(p) };
         let p = p.clamp(0.0, 1.0);
         let x = encoded(p) + slope * (of(mean) - p) - encoded(reference);
         [x as f32, (slope * 0.5 * (of(quarters[0]) - of(quarters[1]))) as f32]

@@ -10,21 +10,18 @@
 //! Where few large contributions make it small or negative, half of the first two terms counts, which in expectation is at least
 //! half of the variance.
 //!
-//! Pixels whose noise is correlated form a block ([`noise_blocks`]): all sums are taken within blocks, and variances are
-//! added over them. Two effects are left out because they are small where measured (`benches/spread.rs`): the halves share a
-//! little through the pivot of the other half, and the filter that makes it reaches beyond a block.
+//! Pixels whose noise is correlated form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)): all sums are taken within blocks, and variances are
+//! added over them. Three effects are left out, being small where they were measured (`benches/spread.rs`): the halves share a
+//! little through the pivot of the other half, the filter that makes it reaches beyond a block, and R has noise of its own, which
+//! both halves have in common (`variance` in `scorer.json` states it).
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_10;
 
-use glam::{DVec2, DVec3};
 use mateval_image::{Mask, Picture};
 use mateval_metrics::{MetricError, Psnr};
-use mateval_scene::Camera;
-use mateval_tracer::shared_centre::groups_with_one_centre;
 
 use crate::light::difference::LightDifference;
-use crate::protocol::SampleRules;
 
 /// A Gaussian value exceeds its mean by more than this many standard deviations in 5 % of all cases.
 pub const ONE_SIDED_95: f64 = 1.645;
@@ -141,37 +138,9 @@ pub fn mean_psnr_error(views: &[LightMse]) -> Option<f64> {
     (!views.is_empty()).then(|| variance(by_block.values(), common).sqrt())
 }
 
-/// The block of each pixel of each view. Pixels of one block, in any view, may share paths.
-///
-/// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then squares
-/// of [`SampleRules::block_pixels`] pixels of the image plane of the first of them. Other cameras have blocks of their own.
-pub fn noise_blocks(rules: &SampleRules, cameras: &[Camera]) -> Vec<Picture<u64>> {
-    let groups = groups_with_one_centre(cameras);
-    let of_view = |(view, camera): (usize, &Camera)| {
-        let group = groups.iter().position(|group| group.contains(&view)).expect("every view is in a group");
-        let first = &cameras[groups[group][0]];
-        let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-        Picture::from_fn(width, height, |x, y| {
-            let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-            (group as u64) << 32 | u64::from(block(first, direction, rules.block_pixels))
-        })
-    };
-    cameras.iter().enumerate().map(of_view).collect()
-}
-
-/// Row and column of a block, 16 bits each, counted from far above and left of the picture.
-fn block(first: &Camera, direction: DVec3, side: u32) -> u32 {
-    let local = first.rotation().transpose() * direction;
-    let k = first.intrinsics;
-    let at = DVec2::new(k.cx - k.fx * local.x / local.z, k.cy + k.fy * local.y / local.z);
-    let step = |value: f64| ((value / f64::from(side)).floor() + 32768.0).clamp(0.0, 65535.0) as u32;
-    step(at.y) << 16 | step(at.x)
-}
-
 #[cfg(test)]
 mod tests {
     use mateval_image::SrgbRgb;
-    use mateval_scene::Intrinsics;
 
     use super::*;
 
@@ -229,46 +198,5 @@ mod tests {
         let exact = LightMse { mse: 0.0, blocks: vec![(1, BlockNoise::default())], common: 0.0 };
         assert!(!exact.is_lower_bound() && exact.psnr().unwrap().exact);
         assert_eq!(mean_psnr_error(&[exact]), Some(0.0));
-    }
-
-    fn rules() -> SampleRules {
-        crate::protocol::Protocol::named("mateval-3").unwrap().light.samples
-    }
-
-    fn cameras() -> Vec<Camera> {
-        let intrinsics = Intrinsics::from_fov_x(96, 64, 1.0);
-        let input = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::new(1.0, 2.0, 3.0), intrinsics);
-        vec![input, input.turned(5.0, -5.0)]
-    }
-
-    /// What both views see, at a distance, is of one block in both; the first view's blocks are squares.
-    #[test]
-    fn one_direction_is_of_one_block() {
-        let cameras = cameras();
-        let blocks = noise_blocks(&rules(), &cameras);
-        assert_eq!(blocks[0].get(0, 0), blocks[0].get(15, 15));
-        assert_ne!(blocks[0].get(15, 0), blocks[0].get(16, 0));
-        let mut distinct = blocks[0].pixels().to_vec();
-        distinct.sort_unstable();
-        distinct.dedup();
-        assert_eq!(distinct.len(), 6 * 4);
-        let mut met = 0;
-        for (x, y) in [(50, 30), (70, 40), (90, 50), (40, 20)] {
-            let place = cameras[1].position() + cameras[1].direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) * 9.0;
-            let (pixel, _) = cameras[0].project(place).unwrap();
-            if cameras[0].holds(pixel) {
-                met += 1;
-                assert_eq!(blocks[1].get(x, y), blocks[0].get(pixel.x as usize, pixel.y as usize));
-            }
-        }
-        assert!(met >= 2, "{met}");
-    }
-
-    #[test]
-    fn views_from_elsewhere_share_nothing() {
-        let mut cameras = cameras();
-        cameras[1] = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::ZERO, cameras[1].intrinsics);
-        let blocks = noise_blocks(&rules(), &cameras);
-        assert!(blocks[0].pixels().iter().all(|block| !blocks[1].pixels().contains(block)));
     }
 }

@@ -7,7 +7,7 @@
 //! The truth is another renderer's picture, so nothing travels along and nothing is exact.
 
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
-use mateval_light::light_fit::{FitTarget, LightFit, fit_two_streams};
+use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
 use mateval_light::light_stage;
 use mateval_scene::{Camera, RendererId, SceneLights};
 use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
@@ -15,7 +15,6 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, encoded, guided_mean};
-use crate::light::lighting::{FittedRadiance, FittedRadiances};
 use crate::light::predictions::{Each, EncodedReference, Guides, LitPicture, Paths, batches, picture_of};
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
@@ -171,28 +170,9 @@ impl LitRoom {
             FitTarget { photo: &photos[place], mask: Some(&truths[place].valid), exposure: task.scene.exposure };
         let fits = first.iter().zip(&second).map(|(first, second)| {
             let fit = fit_two_streams(&paths.rules.fit, [first, second], &target)?;
-            let radiances = self.radiances(&fit.streams, &fit.weights(), &fit.spread());
+            let radiances = fit.radiances(&self.names, self.is_stage);
             Ok(Fit { streams: fit.streams.map(|stream| stream.weights), radiances })
         });
         fits.collect()
-    }
-
-    fn radiances(&self, streams: &[LightFit; 2], weights: &[[f64; 3]], spread: &[[f64; 3]]) -> FittedRadiances {
-        let lights = self.names.iter().zip(weights.iter().zip(spread));
-        let mean =
-            |of: &dyn Fn(&LightFit) -> f64| streams.iter().map(|fit| of(fit) / fit.squares.max(1) as f64 / 2.0).sum();
-        FittedRadiances {
-            stage: self.is_stage,
-            lights: lights
-                .map(|(light, (radiance, spread))| FittedRadiance {
-                    light: light.clone(),
-                    radiance: *radiance,
-                    spread: *spread,
-                })
-                .collect(),
-            mean_absolute_error: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].misfit)),
-            ridge: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].ridge)),
-            lower_bound: [0, 1, 2].map(|c| mean(&|fit| fit.channels[c].bound)),
-        }
     }
 }

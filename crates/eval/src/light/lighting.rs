@@ -5,11 +5,11 @@ use std::str::FromStr;
 
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
 use mateval_tracer::LightMix;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::protocol::RelitRules;
-use crate::word_enum::{UnknownWord, by_text};
+use mateval_scene::by_text;
+use mateval_scene::word_enum::UnknownWord;
 
 /// The name of a lighting of track `relit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -127,36 +127,6 @@ fn weighted_luminance(sum: &[f64; 3], weight: &[f64; 3]) -> f64 {
 
 fn luminance(rgb: [f64; 3]) -> f64 {
     LUMINANCE.iter().zip(rgb).map(|(weight, value)| weight * value).sum()
-}
-
-/// Radiances fitted to the input view: the mean of two fits to independent streams of samples, each with the proof that no
-/// other radiances fit better.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FittedRadiances {
-    /// Whether they belong to a light stage; otherwise they multiply the radiances of the scene's own emitters.
-    pub stage: bool,
-    /// The radiance of each light.
-    pub lights: Vec<FittedRadiance>,
-    /// Mean absolute difference of the averaged pictures, linear, for each channel; of both fits. Where the photo is clipped,
-    /// only missing light counts.
-    pub mean_absolute_error: [f64; 3],
-    /// What the ridge adds to that error, mean of both fits.
-    pub ridge: [f64; 3],
-    /// Lower bound of their sum, mean of both fits: no other radiances can have less.
-    pub lower_bound: [f64; 3],
-}
-
-/// One light's radiance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FittedRadiance {
-    /// The light's name.
-    pub light: String,
-    /// Linear Rec. 709.
-    pub radiance: [f64; 3],
-    /// Half the difference between both fits: a sample of the noise of `radiance`.
-    pub spread: [f64; 3],
 }
 
 #[cfg(test)]

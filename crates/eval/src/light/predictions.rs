@@ -17,12 +17,13 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, ViewGuide, corrected_quarter, difference};
-use crate::light::lighting::{FittedRadiances, LightingName, group_shares, light_of, lightings};
+use crate::light::lighting::{LightingName, group_shares, light_of, lightings};
 use crate::light::reference::{StoredReference, weighted};
-use crate::mask_rule::ReferenceFeatures;
 use crate::protocol::{LightRules, Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
 use crate::truth::{ViewTruth, true_maps};
+use mateval_light::light_fit::FittedRadiances;
+use mateval_metrics::mask_rule::ReferenceFeatures;
 
 /// A prediction under one light, compared with the reference.
 pub(crate) struct LitPicture<'a> {

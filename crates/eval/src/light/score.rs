@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::LightDifference;
-use crate::light::error::{LightMse, mean_psnr_error, noise_blocks};
+use crate::light::error::{LightMse, mean_psnr_error};
 use crate::light::fitted::score_fitted;
 use crate::light::predictions::{Each, LitPicture, score_own};
 use crate::materials::score::{round_to_steps, similarities};
@@ -16,6 +16,7 @@ use crate::result::PictureValues;
 use crate::result::key::{Metric, PictureKind, Region, Surfaces, Views};
 use crate::scene::{BaseColors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::ViewTruth;
+use mateval_tracer::shared_centre::noise_blocks;
 
 /// Scores every submission under the lights of protocol number `at`.
 pub(crate) fn score_light(
@@ -63,7 +64,7 @@ struct LightMeter<'a> {
 impl<'a> LightMeter<'a> {
     fn new(task: &'a SceneTask<'a>, truths: &'a [ViewTruth], protocol: &'a Protocol) -> Self {
         let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
-        let blocks = noise_blocks(&protocol.light.samples, &cameras);
+        let blocks = noise_blocks(&cameras, protocol.light.samples.block_pixels);
         Self { task, protocol, truths, regions: truths.iter().map(regions).collect(), blocks }
     }
 

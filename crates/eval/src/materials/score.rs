@@ -2,6 +2,7 @@
 //! with its scale removed.
 
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
+use mateval_metrics::alignment::{channel_scales, scaled};
 use mateval_metrics::{Lpips, MetricError, Psnr, delta_e, mse};
 use mateval_scene::Report;
 use mateval_scene::dataset::View;
@@ -9,7 +10,6 @@ use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::mask_rule::ReferenceFeatures;
 use crate::materials::pictures::{MaterialPictures, material_pictures};
 use crate::materials::texels::texture_space;
 use crate::protocol::{AlbedoSpace, Protocol};
@@ -17,6 +17,7 @@ use crate::result::PictureValues;
 use crate::result::key::{HALF_A_BYTE, Metric, PictureKind, Region, Surfaces, Views};
 use crate::scene::{BaseColors, InstanceErrors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::{ViewTruth, true_maps};
+use mateval_metrics::mask_rule::ReferenceFeatures;
 
 /// One submission's pictures of a view.
 struct Predicted {
@@ -305,26 +306,6 @@ pub(crate) fn round_to_steps(protocol: &Protocol, value: f64) -> f64 {
     (value * steps).round() / steps
 }
 
-/// The scale of each channel that brings `prediction` nearest to `reference` in the mean square over the mask, in linear
-/// light: sum(gt * p) / sum(p * p); 1 where the denominator is 0. (Stanford-ORB's definition, applied to each picture alone.)
-pub fn channel_scales(prediction: &Picture<LinearRgb>, reference: &Picture<LinearRgb>, mask: &Mask) -> [f64; 3] {
-    let mut products = [0.0_f64; 3];
-    let mut squares = [0.0_f64; 3];
-    let pairs = prediction.pixels().iter().zip(reference.pixels()).zip(mask.pixels());
-    for ((LinearRgb(p), LinearRgb(gt)), _) in pairs.filter(|(_, counts)| **counts) {
-        for channel in 0..3 {
-            products[channel] += f64::from(gt[channel]) * f64::from(p[channel]);
-            squares[channel] += f64::from(p[channel]) * f64::from(p[channel]);
-        }
-    }
-    std::array::from_fn(|c| if squares[c] == 0.0 { 1.0 } else { products[c] / squares[c] })
-}
-
-/// The picture, each channel multiplied by its scale.
-pub fn scaled(picture: &Picture<LinearRgb>, scales: [f64; 3]) -> Picture<LinearRgb> {
-    picture.map(|LinearRgb(rgb)| LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * scales[c]) as f32)))
-}
-
 #[cfg(test)]
 mod tests {
     use mateval_scene::{SceneId, ViewId};
@@ -399,28 +380,5 @@ mod tests {
         assert_eq!(found.len(), 2);
         assert!(measured(128.0 / 255.0 - 0.5).values().all(|error| *error == 0.0));
         assert!(measured(0.51 / 255.0).values().all(|error| *error > 0.0));
-    }
-
-    fn truth() -> Picture<LinearRgb> {
-        Picture::from_fn(8, 4, |x, y| LinearRgb([0.1 * x as f32, 0.2 * y as f32, 0.5]))
-    }
-
-    #[test]
-    fn undoes_a_scale_of_each_channel() {
-        let dimmed = scaled(&truth(), [0.5, 0.25, 2.0]);
-        let scales = channel_scales(&dimmed, &truth(), &Picture::filled(8, 4, true));
-        for (found, expected) in scales.into_iter().zip([2.0, 4.0, 0.5]) {
-            assert!((found - expected).abs() < 1e-6);
-        }
-    }
-
-    #[test]
-    fn only_the_mask_counts_and_black_stays_black() {
-        let mut dimmed = scaled(&truth(), [0.5; 3]);
-        dimmed.set(0, 0, LinearRgb([9.0; 3]));
-        let mask = Picture::from_fn(8, 4, |x, _| x > 0);
-        assert!((channel_scales(&dimmed, &truth(), &mask)[2] - 2.0).abs() < 1e-6);
-        let black = Picture::filled(8, 4, LinearRgb([0.0; 3]));
-        assert_eq!(channel_scales(&black, &truth(), &mask), [1.0; 3]);
     }
 }

@@ -11,7 +11,8 @@ use mateval_scene::submission::Map;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::word_enum::{UnknownWord, by_text, quoted, word_enum};
+use mateval_scene::word_enum::{UnknownWord, quoted};
+use mateval_scene::{by_text, word_enum};
 
 /// The better direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

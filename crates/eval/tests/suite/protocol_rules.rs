@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
 use mateval_eval::EvalError;
-use mateval_eval::light::error::noise_blocks;
 use mateval_eval::light::lighting::lightings;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::protocol::Track;
@@ -16,6 +15,7 @@ use mateval_scene::Camera;
 use mateval_scene::open::Dataset;
 use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::World;
+use mateval_tracer::shared_centre::noise_blocks;
 use serde_json::{Value, json};
 
 use super::sample::{dataset, hasty, plan, write_grey};
@@ -163,7 +163,7 @@ fn relit(protocol: &Protocol) -> Value {
 
 fn blocks(protocol: &Protocol) -> Value {
     let cameras: [Camera; 1] = [dataset().scenes[0].views[0].camera];
-    json!(noise_blocks(&protocol.light.samples, &cameras)[0].pixels())
+    json!(noise_blocks(&cameras, protocol.light.samples.block_pixels)[0].pixels())
 }
 
 /// Samples of views of several sizes.

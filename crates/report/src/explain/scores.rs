@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use mateval_eval::materials::score::scaled;
 use mateval_eval::materials::score::{Albedo, albedo_mse};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::{PictureKind, Views};
 use mateval_eval::shown::SceneAlbedo;
 use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_metrics::alignment::scaled;
 use mateval_metrics::{MetricError, Psnr};
 use mateval_scene::{InstanceId, SceneId};
 

@@ -478,6 +478,9 @@ fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     (position.distance(target) > 1e-6).then_some(DesignerCamera { number, position, target, fov_y_deg })
 }
 
+/// The path of a file, as findings give it, and its SHA-256.
+type PathAndHash = (String, String);
+
 /// The cameras from the file `beside` the house, relative to `root`. Without such a file, or where it has none for this house, those from the
 /// house's JSON. Sorted by number. Returns the path and the hash of the file too, if it was read.
 pub(super) fn designer_cameras(
@@ -486,7 +489,7 @@ pub(super) fn designer_cameras(
     beside: Option<&Path>,
     limits: &Limits,
     log: &mut Log,
-) -> Result<(Vec<DesignerCamera>, Option<(String, String)>), SourceError> {
+) -> Result<(Vec<DesignerCamera>, Option<PathAndHash>), SourceError> {
     let Some(beside) = beside else { return Ok((house.cameras.clone(), None)) };
     let path = root.join(beside);
     let (folder, _, bytes) = open(&path, limits.json_bytes, limits.json_bytes)?;

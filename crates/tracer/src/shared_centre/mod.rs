@@ -11,7 +11,7 @@ mod plane;
 use std::array::from_fn;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::Vec3;
+use glam::{DVec2, DVec3, Vec3};
 use mateval_image::Picture;
 use mateval_scene::Camera;
 use mateval_scene::reference::LightIndex;
@@ -556,4 +556,31 @@ fn add(sum: &mut [f64; 3], value: [f64; 3], weight: f64) {
     for channel in 0..3 {
         sum[channel] += weight * value[channel];
     }
+}
+
+/// The block of each pixel of each view. Pixels of one block, in any view, may share paths.
+///
+/// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then squares
+/// of `side` pixels of the image plane of the first of them. Other cameras have blocks of their own.
+pub fn noise_blocks(cameras: &[Camera], side: u32) -> Vec<Picture<u64>> {
+    let groups = groups_with_one_centre(cameras);
+    let of_view = |(view, camera): (usize, &Camera)| {
+        let group = groups.iter().position(|group| group.contains(&view)).expect("every view is in a group");
+        let first = &cameras[groups[group][0]];
+        let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+        Picture::from_fn(width, height, |x, y| {
+            let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+            (group as u64) << 32 | u64::from(block(first, direction, side))
+        })
+    };
+    cameras.iter().enumerate().map(of_view).collect()
+}
+
+/// Row and column of a block, 16 bits each, counted from far above and left of the picture.
+fn block(first: &Camera, direction: DVec3, side: u32) -> u32 {
+    let local = first.rotation().transpose() * direction;
+    let k = first.intrinsics;
+    let at = DVec2::new(k.cx - k.fx * local.x / local.z, k.cy + k.fy * local.y / local.z);
+    let step = |value: f64| ((value / f64::from(side)).floor() + 32768.0).clamp(0.0, 65535.0) as u32;
+    step(at.y) << 16 | step(at.x)
 }

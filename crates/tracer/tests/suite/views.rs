@@ -3,14 +3,14 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::material::{ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, ScalarInput};
 use mateval_scene::reference::{Emission, LightIndex, ReferenceScene};
 use mateval_scene::{Camera, Intrinsics};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use mateval_testkit::statistics::Renders;
-use mateval_tracer::shared_centre::groups_with_one_centre;
+use mateval_tracer::shared_centre::{groups_with_one_centre, noise_blocks};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, ViewsRender, World, render_views};
 
 /// A room open to a pale sky behind the camera, with three lamps, one of them hidden from the camera, and a rough metal
@@ -431,4 +431,41 @@ fn small_pictures_lose_nothing() {
             assert!((pixel.0[0] - 1.0).abs() < 0.3, "{pixel:?}");
         }
     }
+}
+
+fn turned_cameras() -> Vec<Camera> {
+    let intrinsics = Intrinsics::from_fov_x(96, 64, 1.0);
+    let input = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::new(1.0, 2.0, 3.0), intrinsics);
+    vec![input, input.turned(5.0, -5.0)]
+}
+
+/// What both views see, at a distance, is of one block in both; the first view's blocks are squares.
+#[test]
+fn one_direction_is_of_one_block() {
+    let cameras = turned_cameras();
+    let blocks = noise_blocks(&cameras, 16);
+    assert_eq!(blocks[0].get(0, 0), blocks[0].get(15, 15));
+    assert_ne!(blocks[0].get(15, 0), blocks[0].get(16, 0));
+    let mut distinct = blocks[0].pixels().to_vec();
+    distinct.sort_unstable();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 6 * 4);
+    let mut met = 0;
+    for (x, y) in [(50, 30), (70, 40), (90, 50), (40, 20)] {
+        let place = cameras[1].position() + cameras[1].direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) * 9.0;
+        let (pixel, _) = cameras[0].project(place).unwrap();
+        if cameras[0].holds(pixel) {
+            met += 1;
+            assert_eq!(blocks[1].get(x, y), blocks[0].get(pixel.x as usize, pixel.y as usize));
+        }
+    }
+    assert!(met >= 2, "{met}");
+}
+
+#[test]
+fn views_from_elsewhere_share_nothing() {
+    let mut cameras = turned_cameras();
+    cameras[1] = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::ZERO, cameras[1].intrinsics);
+    let blocks = noise_blocks(&cameras, 16);
+    assert!(blocks[0].pixels().iter().all(|block| !blocks[1].pixels().contains(block)));
 }

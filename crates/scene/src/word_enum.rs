@@ -1,5 +1,5 @@
-//! Macros for types that are words in files: [`word_enum`] for enums whose variants are words, [`by_text`] for types that print
-//! and parse themselves.
+//! Macros for types that are words in files: [`word_enum!`](crate::word_enum!) for enums whose variants are words,
+//! [`by_text!`](crate::by_text!) for types that print and parse themselves.
 
 /// A word that an enum does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -13,12 +13,13 @@ pub struct UnknownWord {
 }
 
 /// An untrusted text in quotes, without control characters and at most 80 characters long.
-pub(crate) fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     format!("'{}'", text.chars().take(80).collect::<String>().escape_debug())
 }
 
 /// Defines an enum with `ALL`, `word`, `Display`, `FromStr`, serde and a schema. Variants compare as their words do, so
 /// that maps of them are written in the order of the printed text; `ALL` keeps the order of the definition.
+#[macro_export]
 macro_rules! word_enum {
     (
         $(#[$meta:meta])*
@@ -75,10 +76,10 @@ macro_rules! word_enum {
         }
     };
 }
-pub(crate) use word_enum;
 
 /// Serde and a schema by way of `Display` and `FromStr`. The pattern holds the shape alone: `dataset_spec/FORMAT.md` lists the
 /// words.
+#[macro_export]
 macro_rules! by_text {
     ($name:ident, $error:ty, $pattern:literal) => {
         impl TryFrom<String> for $name {
@@ -106,4 +107,3 @@ macro_rules! by_text {
         }
     };
 }
-pub(crate) use by_text;

@@ -3,10 +3,11 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mateval_image::{Mask, Picture, SrgbRgb};
-use mateval_metrics::pixel::pixel_count;
-use mateval_metrics::{Features, Lpips, MaskedSsim, MetricError, Pixel, ssim_black_fill, ssim_valid_windows};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::pixel::pixel_count;
+use crate::{Features, Lpips, MaskedSsim, MetricError, Pixel, ssim_black_fill, ssim_valid_windows};
 
 /// What metrics whose windows look across a mask's edge do outside the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -20,10 +21,10 @@ pub enum MaskRule {
 }
 
 /// A value, none where nothing counts, and the number of pixels or windows that it is a mean over.
-pub(crate) type Counted = (Option<f64>, usize);
+pub type Counted = (Option<f64>, usize);
 
 impl MaskRule {
-    pub(crate) fn ssim<P: Pixel>(
+    pub fn ssim<P: Pixel>(
         self,
         prediction: &Picture<P>,
         reference: &Picture<P>,
@@ -36,7 +37,7 @@ impl MaskRule {
     }
 
     /// None where nothing counts or the picture is too small for the network. `features` are those of the reference.
-    pub(crate) fn lpips(
+    pub fn lpips(
         self,
         lpips: &Lpips,
         prediction: &Picture<SrgbRgb>,
@@ -73,20 +74,16 @@ fn windows(inside: Option<MaskedSsim>) -> Counted {
 
 /// The features of one reference picture, whole and with black outside of masks, as far as they have been asked for.
 #[derive(Default)]
-pub(crate) struct ReferenceFeatures(Mutex<Vec<(Option<Mask>, Arc<Features>)>>);
+pub struct ReferenceFeatures(Mutex<Vec<(Option<Mask>, Arc<Features>)>>);
 
 impl ReferenceFeatures {
     /// Those of the whole reference; absent if it is too small for the network. The reference is the same at every call.
-    pub(crate) fn whole(
-        &self,
-        lpips: &Lpips,
-        reference: &Picture<SrgbRgb>,
-    ) -> Result<Option<Arc<Features>>, MetricError> {
+    pub fn whole(&self, lpips: &Lpips, reference: &Picture<SrgbRgb>) -> Result<Option<Arc<Features>>, MetricError> {
         self.of(None, || lpips.features(reference))
     }
 
     /// Those of the reference with black outside the mask.
-    pub(crate) fn black_filled(
+    pub fn black_filled(
         &self,
         lpips: &Lpips,
         reference: &Picture<SrgbRgb>,
