@@ -44,6 +44,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ => continue,
         };
         keep(&corpus, target, &name.replace('/', "_"), &bytes)?;
+        if target == "texture" {
+            keep(&corpus, "photo", &name.replace('/', "_"), &bytes)?;
+        }
     }
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../dataset_spec/examples");
     for (name, target) in
@@ -54,6 +57,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for entry in &mateval_procedural::library::LIBRARY {
         keep(&corpus, "mtlx", entry.name, entry.text.as_bytes())?;
     }
+    let header = "{'descr': '<i4', 'fortran_order': False, 'shape': (3,), }";
+    let numbers = [&b"\x93NUMPY\x01\x00\x76\x00"[..], format!("{header:117}\n").as_bytes(), &[1, 0, 0, 0].repeat(3)].concat();
+    keep(&corpus, "npy", "labels", &numbers)?;
     maps(&corpus, work.path())?;
     archives(&corpus, work.path())?;
     geometry(&corpus, work.path(), &source)

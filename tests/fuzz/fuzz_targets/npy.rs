@@ -1,0 +1,16 @@
+#![no_main]
+//! Reads NumPy's files: labels of parts, and a texture or estimate.
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use mateval_image::Wrap;
+use mateval_image::texture_io::{Encoding, texture_of_bytes};
+use mateval_sources::npy::whole_numbers;
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = whole_numbers(bytes);
+    if let Ok(texture) = texture_of_bytes(Path::new("a.npy"), bytes.to_vec(), Encoding::Linear, Wrap::Clamp) {
+        assert!(texture.width() > 0 && texture.height() > 0);
+    }
+});
