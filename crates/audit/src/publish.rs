@@ -1,4 +1,5 @@
-//! Splits a dataset into two folders: the files that everybody may see, and the ground truth that a hidden split withholds.
+//! Splits a dataset into two folders: the files that everybody may see, and the ground truth that a hidden split
+//! withholds.
 //!
 //! The public folder keeps the whole manifest. It therefore has the same identity as the dataset, and lists the hash of
 //! every withheld file. Copied over the public folder, the private one restores the dataset.
@@ -17,8 +18,8 @@ use crate::AuditError;
 /// The result of publishing a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Published {
-    /// SHA-256, in hexadecimal, of the manifest's lines of the withheld files, each with its newline. Whoever has the public
-    /// folder can compute it too, and check the private folder against the manifest once that is published.
+    /// SHA-256, in hexadecimal, of the manifest's lines of the withheld files, each with its newline. Whoever has the
+    /// public folder can compute it too, and check the private folder against the manifest once that is published.
     pub commitment_sha256: String,
     /// Number of files in the public folder.
     pub public_files: usize,
@@ -26,8 +27,9 @@ pub struct Published {
     pub private_files: usize,
 }
 
-/// Writes the public files of the dataset in `root` to `public` and its ground truth to `private`; both are replaced where
-/// they exist. Fails before anything is written where a file differs from the manifest or there is no ground truth.
+/// Writes the public files of the dataset in `root` to `public` and its ground truth to `private`; both are replaced
+/// where they exist. Fails before anything is written where a file differs from the manifest or there is no ground
+/// truth.
 pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_>) -> Result<Published, AuditError> {
     let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
     check_whole(root, &dataset)?;
@@ -57,7 +59,8 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     Ok(Published { commitment_sha256, public_files: shown.len(), private_files: withheld.len() })
 }
 
-/// The commitment to the ground truth of the dataset in `root`, from its manifest alone: [`Published::commitment_sha256`].
+/// The commitment to the ground truth of the dataset in `root`, from its manifest alone:
+/// [`Published::commitment_sha256`].
 pub fn commitment(root: &Path) -> Result<String, AuditError> {
     Ok(commitment_of(&split(root)?.0))
 }

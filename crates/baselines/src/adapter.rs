@@ -170,8 +170,8 @@ impl Adapter {
 /// The placeholder for the scene's id in a path.
 const SCENE: &str = "{scene}";
 
-/// The largest linear value of an estimate. Materials end at 1 or little above; far larger numbers, such as those from 0 to
-/// 255, have another range than the adapter states.
+/// The largest linear value of an estimate. Materials end at 1 or little above; far larger numbers, such as those from
+/// 0 to 255, have another range than the adapter states.
 const LARGEST: f32 = 16.0;
 /// Larger linear values are more than highlights and the noise of a network.
 const BRIGHT: f32 = 1.5;
@@ -284,8 +284,8 @@ impl AdaptedFile {
         Ok(Some(picture))
     }
 
-    /// The stored numbers; absent if an optional file is missing. Fails where 16-bit integers are those of bytes and the
-    /// adapter does not say so, since all values would be near 0.
+    /// The stored numbers; absent if an optional file is missing. Fails where 16-bit integers are those of bytes and
+    /// the adapter does not say so, since all values would be near 0.
     pub(crate) fn stored(
         &self,
         folder: &Path,

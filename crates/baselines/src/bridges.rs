@@ -1,9 +1,10 @@
 //! Bridges to projects that process one object at a time.
 //!
-//! TEXGen (Yu and others, "TEXGen: a Generative Diffusion Model for Mesh Textures", SIGGRAPH Asia 2024) completes the UV
-//! texture of an object. [`export_texgen`] writes each instance as TEXGen's loader reads objects; [`import_texgen`] makes
-//! a submission of its textures. An object's folder is `<first two characters of its id>/<id>`. In pictures v points up
-//! from the lower edge, as in the dataset's atlases: TEXGen flips them when it reads and again when it writes.
+//! TEXGen (Yu and others, "TEXGen: a Generative Diffusion Model for Mesh Textures", SIGGRAPH Asia 2024) completes the
+//! UV texture of an object. [`export_texgen`] writes each instance as TEXGen's loader reads objects; [`import_texgen`]
+//! makes a submission of its textures. An object's folder is `<first two characters of its id>/<id>`. In pictures v
+//! points up from the lower edge, as in the dataset's atlases: TEXGen flips them when it reads and again when it
+//! writes.
 //!
 //! PartField (Liu and others, "PartField: Learning 3D Feature Fields for Part Segmentation and Beyond", 2025) splits a
 //! mesh into parts. [`export_partfield`] writes the meshes. [`import_partfield`] copies PartField's labels to where
@@ -173,9 +174,9 @@ pub struct Imported {
     pub textured: usize,
 }
 
-/// Writes a submission. Seen texels hold the estimate; the base colour of all others is that of `results/<id>.png` (sRGB,
-/// any square size) at their uv. An instance without such a file, and roughness and metallic everywhere, are as `nn` with
-/// its defaults makes them from the same estimate. Fails where no file exists for any instance.
+/// Writes a submission. Seen texels hold the estimate; the base colour of all others is that of `results/<id>.png`
+/// (sRGB, any square size) at their uv. An instance without such a file, and roughness and metallic everywhere, are as
+/// `nn` with its defaults makes them from the same estimate. Fails where no file exists for any instance.
 pub fn import_texgen(
     dataset: &Dataset,
     results: &Path,
@@ -257,9 +258,9 @@ pub fn export_partfield(dataset: &Dataset, out: &Path) -> Result<usize, Baseline
 }
 
 /// Copies `<id>_0_<parts>.npy`, PartField's labels of an instance that is split into `parts` parts, from `clusters` to
-/// `<scene>/<instance>.npy`. PartField writes no such file for an instance with fewer triangles than parts; the file with
-/// the next smaller number of parts is taken then. An instance without any such file keeps its own parts. Returns the
-/// number of instances with labels.
+/// `<scene>/<instance>.npy`. PartField writes no such file for an instance with fewer triangles than parts; the file
+/// with the next smaller number of parts is taken then. An instance without any such file keeps its own parts. Returns
+/// the number of instances with labels.
 pub fn import_partfield(dataset: &Dataset, clusters: &Path, parts: u8, out: &Path) -> Result<usize, BaselineError> {
     check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;

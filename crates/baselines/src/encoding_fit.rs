@@ -5,10 +5,10 @@
 //! power of 1/2.2 that is read as linear) or is bent. Each group, a channel of a scene, has a free factor of its own.
 //! The errors of a network repeat within an instance, so two encodings are compared over instances and not over pixels.
 //!
-//! A verdict is firm only if it could not as well come from the method's own errors. With many instances a difference of
-//! a hundredth of an error is significant, and clipped highlights or contrast that is too low cause that much. So the
-//! best encoding must explain at least [`LEAST_EXPLAINED`] of the truth's variance, and the error of every other one must
-//! be at least [`CLEARLY_WORSE`] times as large.
+//! A verdict is firm only if it could not as well come from the method's own errors. With many instances a difference
+//! of a hundredth of an error is significant, and clipped highlights or contrast that is too low cause that much. So
+//! the best encoding must explain at least [`LEAST_EXPLAINED`] of the truth's variance, and the error of every other
+//! one must be at least [`CLEARLY_WORSE`] times as large.
 
 use mateval_scene::submission::StoredEncoding;
 use schemars::JsonSchema;
@@ -103,8 +103,8 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodingFit {
     pub verdict: Verdict,
-    /// The encodings that they fit, the best first: all of them if even the best explains little; empty unless the verdict
-    /// is `Fits` or `Undecided`.
+    /// The encodings that they fit, the best first: all of them if even the best explains little; empty unless the
+    /// verdict is `Fits` or `Undecided`.
     pub fits: Vec<FittedEncoding>,
     pub candidates: Vec<Candidate>,
     /// Number of instances with enough samples.
@@ -233,8 +233,8 @@ fn not_worse(lines: &[Line; 4], samples: &[Sample], instances: &[bool]) -> Vec<F
     fits
 }
 
-/// Whether the first deviations are clearly larger than the second ones, and by more than chance, over the instances with
-/// enough samples.
+/// Whether the first deviations are clearly larger than the second ones, and by more than chance, over the instances
+/// with enough samples.
 fn is_larger(first: &[f64], second: &[f64], samples: &[Sample], instances: &[bool]) -> bool {
     if first.iter().sum::<f64>() < CLEARLY_WORSE * second.iter().sum::<f64>() {
         return false;

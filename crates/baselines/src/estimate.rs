@@ -1,5 +1,5 @@
-//! An estimate: what a method makes of the input view, as pictures of base colour, roughness and metallic, and how these
-//! lie on the view.
+//! An estimate: what a method makes of the input view, as pictures of base colour, roughness and metallic, and how
+//! these lie on the view.
 
 use std::path::Path;
 

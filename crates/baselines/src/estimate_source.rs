@@ -67,8 +67,8 @@ impl EstimateSource {
         }
     }
 
-    /// Which of a method's pictures are read for the dataset's scenes, and which lie beside them and are not; `None` for
-    /// other estimates.
+    /// Which of a method's pictures are read for the dataset's scenes, and which lie beside them and are not; `None`
+    /// for other estimates.
     pub fn files_read(&self, dataset: &Dataset) -> Option<String> {
         let Self::Files { folder, adapter } = self else { return None };
         let scenes: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();

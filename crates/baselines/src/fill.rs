@@ -1,8 +1,8 @@
 //! Fills the texels that the input view does not show from the points that it shows.
 //!
-//! The pixels of an estimate are points in space (the paper's partial point cloud), with nearest-point queries. The tree
-//! is an R*-tree and not a k-d tree: a view shows flat pieces of a room, and for a query above such a piece a k-d tree,
-//! which bounds points by planes and not by boxes, visits many points beside it (`benches/lifting.rs`).
+//! The pixels of an estimate are points in space (the paper's partial point cloud), with nearest-point queries. The
+//! tree is an R*-tree and not a k-d tree: a view shows flat pieces of a room, and for a query above such a piece a k-d
+//! tree, which bounds points by planes and not by boxes, visits many points beside it (`benches/lifting.rs`).
 
 use std::num::NonZero;
 
@@ -19,8 +19,8 @@ use crate::lift::{PartialAtlas, Texel, place_of};
 /// How the values of an unseen texel are computed from seen points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FillRule {
-    /// Number of nearest points: 1 in the paper. Several are averaged with the inverse square of the distance as weight;
-    /// Point-UV Diffusion uses 3.
+    /// Number of nearest points: 1 in the paper. Several are averaged with the inverse square of the distance as
+    /// weight; Point-UV Diffusion uses 3.
     pub neighbours: NonZero<usize>,
     /// Distance that opposite normals count as, in metres; normals at right angles count 0.71 of it. 0 ignores normals.
     pub normal_weight_m: f64,

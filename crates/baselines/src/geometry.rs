@@ -1,5 +1,5 @@
-//! A scene as methods see it: the instances' meshes with their atlas uv, rays through them, which instance each pixel of
-//! an estimate shows and where on its surface, and the part that each triangle belongs to.
+//! A scene as methods see it: the instances' meshes with their atlas uv, rays through them, which instance each pixel
+//! of an estimate shows and where on its surface, and the part that each triangle belongs to.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! One colour per instance or per part: the median of an estimate inside its mask; and `grey`, the floor: one colour for
-//! every surface.
+//! One colour per instance or per part: the median of an estimate inside its mask; and `grey`, the floor: one colour
+//! for every surface.
 //!
 //! IM2CAD (Izadinia et al., CVPR 2017) colours furniture in this way, per instance; procedural methods fall back to it
 //! per part.
@@ -21,8 +21,8 @@ use crate::maps::{Maps, Medians, PartColors, median};
 use crate::nn::seen_pixels;
 use crate::submission::{self, Method};
 
-/// Writes base colour 0.5 (linear) for every instance and returns their number. Roughness and metallic have no files, so
-/// that the format's defaults hold.
+/// Writes base colour 0.5 (linear) for every instance and returns their number. Roughness and metallic have no files,
+/// so that the format's defaults hold.
 pub fn write_grey(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
     let texel = [byte_from_unit(srgb_from_linear(GREY)); 3];
     let size = *MAP_SIZES.start();
@@ -60,8 +60,8 @@ pub fn write_by_instance(
     })
 }
 
-/// Writes a submission with one colour per part of the set and returns the number of instances. An unseen part takes the
-/// median of its instance.
+/// Writes a submission with one colour per part of the set and returns the number of instances. An unseen part takes
+/// the median of its instance.
 pub fn write_by_part(
     dataset: &Dataset,
     out: &Path,

@@ -8,8 +8,8 @@
 //! it; [`import`] transfers meshes that have their own uv. [`bridges`]: with TEXGen another project's network fills
 //! unseen texels, with PartField one splits instances into parts.
 //!
-//! Steps: [`geometry`] reads the scene as methods see it and determines which instance each pixel shows; [`lift`] writes
-//! the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.
+//! Steps: [`geometry`] reads the scene as methods see it and determines which instance each pixel shows; [`lift`]
+//! writes the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.
 
 pub mod adapter;
 pub mod bridges;

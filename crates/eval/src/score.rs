@@ -22,14 +22,15 @@ use mateval_submission::prediction::{PredictedScene, read_scene};
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::score_light;
+use crate::open_scene::{OpenScene, ViewSet, check_photos, scored_views};
+use crate::pictures_dir::PicturesDir;
 use crate::protocol::{Protocol, Track};
 use crate::result::key::{LPIPS_NET, Metric, PictureKind};
 use crate::result::means::{means, summary_noise};
 use crate::result::{
     MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
 };
-use crate::scene::{OpenScene, SceneScore, SceneTask, ScoreSheet, ViewSet, check_photos, scored_views};
-use crate::shown::PicturesDir;
+use crate::scene::{SceneScore, SceneTask, ScoreSheet};
 
 /// The network of LPIPS, or the reason why it is missing.
 pub enum LpipsWeights {
@@ -64,13 +65,13 @@ pub struct ScorePlan<'a> {
     pub tool: String,
     /// Number of scenes that are scored at once; each of them uses all threads anyway.
     pub jobs: usize,
-    /// A folder in which scores of scenes are kept by the hash of everything they depend on, so that a killed run resumes.
-    /// It is made with the first score that is kept.
+    /// A folder in which scores of scenes are kept by the hash of everything they depend on, so that a killed run
+    /// resumes. It is made with the first score that is kept.
     pub cache: Option<&'a Path>,
     /// Take every score from the cache and compute none.
     pub only_cached: bool,
-    /// A folder for the pictures behind the numbers, which nothing reads back; with several submissions a folder of it for
-    /// each. No scores are then taken from the cache.
+    /// A folder for the pictures behind the numbers, which nothing reads back; with several submissions a folder of it
+    /// for each. No scores are then taken from the cache.
     pub pictures: Option<&'a Path>,
 }
 
@@ -90,8 +91,8 @@ struct Outcome {
     scores: Vec<SceneScore>,
 }
 
-/// Scores every submission and returns their results in the same order. The camera rays of a scene are traced once for all
-/// submissions, and paths of light once for those that agree in roughness and metallic.
+/// Scores every submission and returns their results in the same order. The camera rays of a scene are traced once for
+/// all submissions, and paths of light once for those that agree in roughness and metallic.
 ///
 /// # Examples
 ///
@@ -287,8 +288,8 @@ impl ScorePlan<'_> {
         }
     }
 
-    /// The cache's file for a scene's scores under a protocol, named after the hash of everything that they depend on. None
-    /// without a cache.
+    /// The cache's file for a scene's scores under a protocol, named after the hash of everything that they depend on.
+    /// None without a cache.
     fn cache_file(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
         let weights = self.lpips.network().map(Lpips::sha256);
         let file = &self.dataset.file;

@@ -1,25 +1,22 @@
-//! Pictures beside the numbers: for pages ([`scene_albedo`], [`scene_light`]), and for whoever computes the numbers again with
-//! other tools ([`PicturesDir`], `eval score --pictures`).
+//! Pictures of submissions beside the truth, for pages.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use mateval_image::exr_io::Precision;
-use mateval_image::{LinearRgb, Picture, SrgbRgb, exr_io};
+use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::open::Dataset;
-use mateval_scene::{InstanceId, Progress, SceneId, TriangleMesh, ViewId};
+use mateval_scene::{Progress, TriangleMesh};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 use crate::error::EvalError;
-use crate::light::difference::{ViewGuide, guided_mean, mean_of};
-use crate::light::lighting::LightingName;
 use crate::light::reference::StoredReference;
 use crate::light::score::compare_light;
-use crate::materials::pictures::{MaterialPictures, material_pictures};
+use crate::materials::pictures::material_pictures;
+use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::protocol::Protocol;
-use crate::scene::{OpenScene, SceneTask, ViewSet, scored_views};
+use crate::scene::SceneTask;
 use crate::truth::ViewTruth;
 
 /// The truth and every submission's albedo of one view, linear.
@@ -118,76 +115,4 @@ pub fn scene_light(
         predicted: predicted.values().map(|views| views[at].clone()).collect(),
     };
     Ok(rows.map(row).collect())
-}
-
-/// Where the pictures of submissions go.
-pub struct PicturesDir<'a> {
-    /// A folder for each submission, in the order of the plan.
-    pub folders: &'a [PathBuf],
-}
-
-impl PicturesDir<'_> {
-    /// The file of an instance's texels, in a folder that exists.
-    pub(crate) fn texels(
-        &self,
-        submission: usize,
-        scene: &SceneId,
-        instance: &InstanceId,
-    ) -> Result<PathBuf, EvalError> {
-        let folder = self.folders[submission].join(scene.as_str()).join("texels");
-        std::fs::create_dir_all(&folder).map_err(EvalError::io("create", &folder))?;
-        Ok(folder.join(instance.as_str()).with_extension("exr"))
-    }
-
-    fn view(&self, submission: usize, scene: &SceneId, view: &ViewId) -> PathBuf {
-        self.folders[submission].join(scene.as_str()).join(view.as_str())
-    }
-}
-
-fn write(folder: &Path, name: &str, picture: &Picture<LinearRgb>) -> Result<(), EvalError> {
-    std::fs::create_dir_all(folder).map_err(EvalError::io("create", folder))?;
-    Ok(exr_io::write_linear(&folder.join(name).with_extension("exr"), picture, Precision::Float)?)
-}
-
-impl PicturesDir<'_> {
-    /// Keeps the pictures of a submission's maps in one view.
-    pub(crate) fn keep_maps(
-        &self,
-        submission: usize,
-        (scene, view): (&SceneId, &ViewId),
-        maps: &MaterialPictures,
-        truth: &Picture<LinearRgb>,
-    ) -> Result<(), EvalError> {
-        let folder = self.view(submission, scene, view);
-        write(&folder, "albedo", &maps.base_color)?;
-        write(&folder, "albedo_of_true_atlas", truth)?;
-        for (name, picture) in [("roughness", &maps.roughness), ("metallic", &maps.metallic)] {
-            exr_io::write_scalar(&folder.join(name).with_extension("exr"), picture, Precision::Float)?;
-        }
-        Ok(())
-    }
-
-    /// Keeps what a submission's errors in one lighting of a view are computed from.
-    pub(crate) fn keep_light(
-        &self,
-        submission: usize,
-        (scene, view): (&SceneId, &ViewId),
-        lighting: Option<LightingName>,
-        quarters: &[Picture<LinearRgb>],
-        guide: &ViewGuide<'_>,
-    ) -> Result<(), EvalError> {
-        let name = lighting.map_or_else(|| "true".to_owned(), |name| name.to_string());
-        let folder = self.view(submission, scene, view).join(&name);
-        write(&folder, "reference", guide.reference)?;
-        write(&folder, "ratio", guide.ratio)?;
-        for (at, quarter) in quarters.iter().enumerate() {
-            write(&folder, &format!("quarter_{at}"), quarter)?;
-        }
-        let pair = |half: usize| [&quarters[2 * half], &quarters[2 * half + 1]];
-        for half in 0..2 {
-            write(&folder, &format!("guided_{half}"), &guided_mean(pair(half), guide))?;
-        }
-        let [a, b] = [0, 1].map(|half| mean_of(pair(half)[0], pair(half)[1]));
-        write(&folder, "shown", &guided_mean([&a, &b], guide))
-    }
 }

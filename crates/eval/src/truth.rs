@@ -99,8 +99,8 @@ pub(crate) fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), E
     }
 }
 
-/// The true maps of an instance: its source's material baked to its atlas of `size` times `size` texels, with the texels that a
-/// submission of the same files would have.
+/// The true maps of an instance: its source's material baked to its atlas of `size` times `size` texels, with the
+/// texels that a submission of the same files would have.
 ///
 /// Fails where a file of `ground_truth/materials/<instance>/` is missing, unsound or of another size.
 pub fn true_material(folder: &SceneFolder, instance: &InstanceId, size: usize) -> Result<PredictedMaterial, EvalError> {

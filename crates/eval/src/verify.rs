@@ -1,8 +1,8 @@
 //! Results checked: against themselves when they are read, and against the submission and dataset that they name.
 //!
-//! [`ResultFile::read`] recomputes every mean from the numbers below it. [`verify`] computes every number again: in come a
-//! result, the submission and the dataset, out comes a [`VerificationFile`]. Before anything is rendered, hashes and rules are
-//! compared: where they differ, numbers would too, and the findings state what has changed.
+//! [`ResultFile::read`] recomputes every mean from the numbers below it. [`verify`] computes every number again: in
+//! come a result, the submission and the dataset, out comes a [`VerificationFile`]. Before anything is rendered, hashes
+//! and rules are compared: where they differ, numbers would too, and the findings state what has changed.
 
 use std::path::Path;
 
@@ -135,8 +135,8 @@ fn finding(file: &str, difference: &Difference) -> Finding {
     )
 }
 
-/// Everything that has changed; numbers are computed again only if this is empty. Fails if the result holds LPIPS and its
-/// weights are missing.
+/// Everything that has changed; numbers are computed again only if this is empty. Fails if the result holds LPIPS and
+/// its weights are missing.
 fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>, EvalError> {
     let name = file_name(plan.result);
     let finding = |code: &str, place: &str, message: String, action: &str| Finding {
@@ -210,8 +210,8 @@ fn weights(
 }
 
 impl ResultFile {
-    /// Reads a result; fails where it has another format, is not valid, holds a number that this version does not know, or a
-    /// mean that is not that of its own numbers.
+    /// Reads a result; fails where it has another format, is not valid, holds a number that this version does not know,
+    /// or a mean that is not that of its own numbers.
     pub fn read(path: &Path) -> Result<Self, EvalError> {
         let result: Self = json::read_format(path, RESULT_FORMAT)?;
         match result.contradiction() {

@@ -103,7 +103,8 @@ fn cameras_text(lenses: &[Intrinsics]) -> String {
     text
 }
 
-/// Two lines a view: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` for each point that it shows.
+/// Two lines a view: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` for each point that it
+/// shows.
 fn images_text(views: &[ShownView<'_>], lenses: &[Intrinsics], points: &[Point]) -> String {
     let mut text = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# X Y POINT3D_ID of each point\n".to_owned();
     for (at, shown) in views.iter().enumerate() {

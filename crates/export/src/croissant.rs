@@ -1,7 +1,8 @@
-//! A description of the tars and of every view in Croissant 1.1, the JSON-LD that dataset searches and `mlcroissant` read.
+//! A description of the tars and of every view in Croissant 1.1, the JSON-LD that dataset searches and `mlcroissant`
+//! read.
 //!
-//! Beside the tars lie `views.jsonl`, a line a view, and `croissant.json`, whose record set `views` joins those lines with
-//! the pictures in the tars by the pictures' paths.
+//! Beside the tars lie `views.jsonl`, a line a view, and `croissant.json`, whose record set `views` joins those lines
+//! with the pictures in the tars by the pictures' paths.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! What every format shares: the files that a dataset's manifest lists, the views that have pictures, the scenes' licences,
-//! and how an export ends.
+//! What every format shares: the files that a dataset's manifest lists, the views that have pictures, the scenes'
+//! licences, and how an export ends.
 
 use std::path::{Path, PathBuf};
 
@@ -155,8 +155,8 @@ pub struct ShownView<'a> {
     pub picture: PathBuf,
 }
 
-/// The 8-bit sRGB picture of a view, relative to the dataset: that of the input view, or the reference picture of another
-/// view. None where it does not exist, as with withheld ground truth.
+/// The 8-bit sRGB picture of a view, relative to the dataset: that of the input view, or the reference picture of
+/// another view. None where it does not exist, as with withheld ground truth.
 pub fn picture(dataset: &Dataset, scene: &SceneFile, view: &View) -> Option<PathBuf> {
     let folder = dataset.folder(&scene.id);
     let file = match (view.id.as_str(), dataset.photo_renderer(scene)) {

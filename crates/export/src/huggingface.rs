@@ -1,8 +1,8 @@
 //! A dataset folder for the Hugging Face Hub: a card and a Parquet file with a row a view, in the split `test`.
 //!
-//! Columns of the Parquet file: `scene`, `view`, `picture` (a PNG file's bytes and its name, as `datasets` stores pictures), `intrinsics`,
-//! `world_from_camera` (row-major) and `licence`. A scene is a row group, so that no more than one scene's pictures are in
-//! memory. Pictures are compressed already, so pages are not.
+//! Columns of the Parquet file: `scene`, `view`, `picture` (a PNG file's bytes and its name, as `datasets` stores
+//! pictures), `intrinsics`, `world_from_camera` (row-major) and `licence`. A scene is a row group, so that no more than
+//! one scene's pictures are in memory. Pictures are compressed already, so pages are not.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -71,7 +71,8 @@ fn features() -> Value {
     })
 }
 
-/// The dataset card. Values of the front matter that are texts are written as JSON strings, which YAML reads as they are.
+/// The dataset card. Values of the front matter that are texts are written as JSON strings, which YAML reads as they
+/// are.
 fn card(sound: &SoundDataset, exported: &Exported) -> String {
     let file = &sound.dataset.file;
     let quoted = |text: &str| Value::from(text).to_string();

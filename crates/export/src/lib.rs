@@ -30,9 +30,9 @@ pub struct ExportOptions {
     pub publication: croissant::Publication,
 }
 
-/// Exports the dataset. Fails before anything is written where the output exists or lies in the dataset, where a file of
-/// the dataset is missing, changed, hidden or not listed in its manifest, where the format needs scenes that are absent,
-/// or pictures that were not rendered.
+/// Exports the dataset. Fails before anything is written where the output exists or lies in the dataset, where a file
+/// of the dataset is missing, changed, hidden or not listed in its manifest, where the format needs scenes that are
+/// absent, or pictures that were not rendered.
 pub fn export(options: &ExportOptions, progress: Progress<'_>) -> Result<Exported, ExportError> {
     if options.out.exists() {
         return Err(ExportError::Exists { path: options.out.clone() });

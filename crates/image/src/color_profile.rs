@@ -1,7 +1,8 @@
 //! The colour space that a photo's file states: an ICC profile, or the chunks gAMA, cHRM and cICP of a PNG.
 //!
-//! Telephones store photos in Display P3. A profile of three primaries and three curves, or of one curve for grey, is applied;
-//! any other is refused by its name, since taking it for sRGB would change every colour. So is one that is damaged.
+//! Telephones store photos in Display P3. A profile of three primaries and three curves, or of one curve for grey, is
+//! applied; any other is refused by its name, since taking it for sRGB would change every colour. So is one that is
+//! damaged.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -40,8 +41,8 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// The profile that a file states; none for sRGB and for a file without any. Fails where it can neither be applied nor
-    /// taken for sRGB.
+    /// The profile that a file states; none for sRGB and for a file without any. Fails where it can neither be applied
+    /// nor taken for sRGB.
     pub(crate) fn of(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ImageError> {
         let unsupported = |what: String| ImageError::Unsupported { path: path.to_owned(), what };
         let unreadable = || unsupported(format!("its colour profile {UNREADABLE}"));
@@ -193,7 +194,8 @@ fn png_info(bytes: &[u8]) -> Option<png::Info<'static>> {
     Some(decoder.read_info().ok()?.info().clone())
 }
 
-/// Whether the chunk cICP of a PNG states sRGB; false without it. Fails where it states other colours or cannot be read.
+/// Whether the chunk cICP of a PNG states sRGB; false without it. Fails where it states other colours or cannot be
+/// read.
 fn is_srgb_by_cicp(bytes: &[u8], info: &png::Info) -> Result<bool, String> {
     let Some(code) = info.coding_independent_code_points else {
         let is_damaged = PngHeader::of(bytes).is_ok_and(|header| header.has(b"cICP"));
@@ -399,8 +401,8 @@ mod tests {
         }
     }
 
-    /// The primaries of Display P3 (SMPTE EG 432-1) under the curve of sRGB: its red is (1.2249, -0.0420, -0.0196) in Rec.
-    /// 709, its white is white.
+    /// The primaries of Display P3 (SMPTE EG 432-1) under the curve of sRGB: its red is (1.2249, -0.0420, -0.0196) in
+    /// Rec. 709, its white is white.
     #[test]
     fn display_p3_is_converted() {
         let p3 = profile(&ColorProfile::new_display_p3()).unwrap();

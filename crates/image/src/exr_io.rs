@@ -1,7 +1,7 @@
 //! Reads and writes float pictures as OpenEXR: one part, scan lines, ZIP, no dates and no names of software or machine.
 //!
-//! Colours are channels `R`, `G`, `B` (linear Rec. 709), vectors `X`, `Y`, `Z`, scalars `V`. [`ExrHeader`] states what a file
-//! holds, without decoding pixels.
+//! Colours are channels `R`, `G`, `B` (linear Rec. 709), vectors `X`, `Y`, `Z`, scalars `V`. [`ExrHeader`] states what
+//! a file holds, without decoding pixels.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;

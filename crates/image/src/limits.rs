@@ -1,5 +1,5 @@
-//! What is known of an untrusted file before memory is taken for it: its size, what it is instead of what was expected, and
-//! the error of this crate.
+//! What is known of an untrusted file before memory is taken for it: its size, what it is instead of what was expected,
+//! and the error of this crate.
 
 use std::borrow::Cow;
 use std::io::{Error, ErrorKind, Read as _};

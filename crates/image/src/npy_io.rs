@@ -4,14 +4,15 @@
 //! leading axes of length 1 are dropped. Types: `u1` and `u2`, which count as the integers of a PNG, and the floats
 //! `f2`, `f4` and `f8`, which count as linear like those of an EXR.
 //!
-//! The header is checked before the library parses it. The library takes memory for the header's stated length, recurses as
-//! deep as its brackets and multiplies the shape's numbers unchecked. The header is therefore compared with what NumPy writes
-//! for a plain array before the library sees it. Pickled objects and structured types have other headers and are refused too.
+//! The header is checked before the library parses it. The library takes memory for the header's stated length,
+//! recurses as deep as its brackets and multiplies the shape's numbers unchecked. The header is therefore compared with
+//! what NumPy writes for a plain array before the library sees it. Pickled objects and structured types have other
+//! headers and are refused too.
 
 use std::path::Path;
 
 use crate::limits::check_size;
-use crate::texture_io::Encoding;
+use crate::texture::Encoding;
 use crate::{ImageError, Texels, Texture, Wrap};
 
 /// The first bytes of a NumPy file.

@@ -19,8 +19,8 @@ pub struct PhotoFile {
 }
 
 impl PhotoFile {
-    /// Reads a photo from a file's bytes. `path` serves for errors only. Fails where a value is negative, NaN or infinite,
-    /// and where the file asks to be turned or mirrored for display: its camera is that of the stored pixels.
+    /// Reads a photo from a file's bytes. `path` serves for errors only. Fails where a value is negative, NaN or
+    /// infinite, and where the file asks to be turned or mirrored for display: its camera is that of the stored pixels.
     pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, ImageError> {
         let invalid = |what: String| ImageError::Invalid { path: path.to_owned(), what };
         if bytes.starts_with(NPY_SIGNATURE) {

@@ -1,4 +1,5 @@
-//! Reads and writes pictures as PNG: previews, ids and masks, without text, time or gamma chunks; writes JPEG for pages.
+//! Reads and writes pictures as PNG: previews, ids and masks, without text, time or gamma chunks; writes JPEG for
+//! pages.
 //!
 //! [`PngHeader`] states what a file holds, without decoding pixels.
 

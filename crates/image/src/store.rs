@@ -29,8 +29,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     })
 }
 
-/// How old the files of a process on another host must be before it counts as gone: longer than any scene takes, and than
-/// clocks differ.
+/// How old the files of a process on another host must be before it counts as gone: longer than any scene takes, and
+/// than clocks differ.
 const GONE_AFTER: Duration = Duration::from_secs(24 * 3600);
 
 const ENDING: &str = ".partial";
@@ -76,8 +76,8 @@ pub fn all_beside(place: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Whether an unfinished file or folder has lost its owner: a process of this host that has ended, or one of another host
-/// that has written nothing for a day.
+/// Whether an unfinished file or folder has lost its owner: a process of this host that has ended, or one of another
+/// host that has written nothing for a day.
 pub fn is_abandoned(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let Some(owner) = owner(&name) else { return false };
@@ -116,8 +116,8 @@ pub struct Owner {
     /// The host's name, with `_` for everything but ASCII letters and digits, and the number of its process namespace.
     pub host: String,
     pub process: u32,
-    /// Distinguishes the process from an earlier one with the same number, such as the first process of a container that
-    /// was started again.
+    /// Distinguishes the process from an earlier one with the same number, such as the first process of a container
+    /// that was started again.
     start: u64,
 }
 

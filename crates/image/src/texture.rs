@@ -1,11 +1,21 @@
 //! A texture, whose texels are kept as they were stored and decoded at each lookup.
 //!
 //! uv (0, 0) is the lower left corner of the picture and v grows upwards, as in OBJ; glTF's v is one minus this v.
-//! Lookups are bilinear between texel centres, which lie at half-integers: [`TexelGrid`] is the grid of texels behind them.
+//! Lookups are bilinear between texel centres, which lie at half-integers: [`TexelGrid`] is the grid of texels behind
+//! them.
 
 use std::sync::Arc;
 
 use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_word};
+
+/// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// With the sRGB curve.
+    Srgb,
+    /// Linearly.
+    Linear,
+}
 
 /// Texels, row by row from the top left. Bytes keep large atlases small.
 #[derive(Clone, Debug, PartialEq)]

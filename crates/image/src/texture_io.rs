@@ -10,16 +10,8 @@ use crate::exr_io::{self, channels_of_bytes, scalar_of_bytes};
 use crate::limits::{check_size, hint, read_file};
 use crate::npy_io::{self, NPY_SIGNATURE};
 use crate::png_io::{Raw, decode_bytes};
+pub use crate::texture::Encoding;
 use crate::{ImageError, Texels, Texture, Wrap};
-
-/// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
-    /// With the sRGB curve.
-    Srgb,
-    /// Linearly.
-    Linear,
-}
 
 /// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {

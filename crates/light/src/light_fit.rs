@@ -1,14 +1,14 @@
 //! The radiances under which a scene looks most like its photo.
 //!
-//! In: a light basis of the input view, or two independent ones ([`fit_two_streams`]), and the photo. Out: one weight for each
-//! light group and channel, and a proof that no others are better ([`RidgeFit`]). The weights are the non-negative ones with
-//! the least sum of absolute differences between photo and weighted basis, plus a ridge towards a start: one weight for all
-//! lights of a channel, with which the means of photo and basis agree. Where the photo is clipped, more light costs nothing.
-//! Photo and basis are first averaged over squares of [`FitRules::pool`] pixels, because L1 on noisy pixels is biased
-//! towards the median of the noise.
+//! In: a light basis of the input view, or two independent ones ([`fit_two_streams`]), and the photo. Out: one weight
+//! for each light group and channel, and a proof that no others are better ([`RidgeFit`]). The weights are the
+//! non-negative ones with the least sum of absolute differences between photo and weighted basis, plus a ridge towards
+//! a start: one weight for all lights of a channel, with which the means of photo and basis agree. Where the photo is
+//! clipped, more light costs nothing. Photo and basis are first averaged over squares of [`FitRules::pool`] pixels,
+//! because L1 on noisy pixels is biased towards the median of the noise.
 //!
-//! Pixels whose photo is clipped are averaged apart from the others of their square: there the photo states only the least
-//! radiance, the one at which it clips.
+//! Pixels whose photo is clipped are averaged apart from the others of their square: there the photo states only the
+//! least radiance, the one at which it clips.
 
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_tracer::LightBasis;
@@ -26,8 +26,8 @@ pub struct FitRules {
     pub pool: u32,
     /// Samples per pixel of the light bases that the fit is made on, half of them for each of two independent streams.
     pub samples: u32,
-    /// The factor of the ridge towards the start, above 0: the share of the photo's light that all lights at twice their
-    /// start add to the objective.
+    /// The factor of the ridge towards the start, above 0: the share of the photo's light that all lights at twice
+    /// their start add to the objective.
     pub ridge: f64,
 }
 
@@ -66,8 +66,8 @@ pub struct LightFit {
 
 /// Fits the basis to the photo.
 ///
-/// Fails if sizes differ, if ridge or exposure are not above 0, if no weights are found, or if a picture holds values that
-/// light cannot have: values that are not finite. The basis may be negative where noise was taken off it.
+/// Fails if sizes differ, if ridge or exposure are not above 0, if no weights are found, or if a picture holds values
+/// that light cannot have: values that are not finite. The basis may be negative where noise was taken off it.
 pub fn fit_lights(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result<LightFit, LightError> {
     check(rules, basis, target)?;
     let lights = basis.pictures().len();
@@ -185,8 +185,8 @@ impl TwoStreamFit {
     }
 }
 
-/// Radiances fitted to the input view: the mean of two fits to independent streams of samples, each with the proof that no
-/// other radiances fit better.
+/// Radiances fitted to the input view: the mean of two fits to independent streams of samples, each with the proof that
+/// no other radiances fit better.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FittedRadiances {
@@ -194,8 +194,8 @@ pub struct FittedRadiances {
     pub stage: bool,
     /// The radiance of each light.
     pub lights: Vec<FittedRadiance>,
-    /// Mean absolute difference of the averaged pictures, linear, for each channel; of both fits. Where the photo is clipped,
-    /// only missing light counts.
+    /// Mean absolute difference of the averaged pictures, linear, for each channel; of both fits. Where the photo is
+    /// clipped, only missing light counts.
     pub mean_absolute_error: [f64; 3],
     /// What the ridge adds to that error, mean of both fits.
     pub ridge: [f64; 3],
@@ -228,15 +228,15 @@ pub fn fit_two_streams(
     Ok(TwoStreamFit { streams: [fit_lights(rules, bases[0], target)?, fit_lights(rules, bases[1], target)?] })
 }
 
-/// Averages over squares of [`FitRules::pool`] pixels, by channel. Pixels outside the mask or the picture count as black,
-/// so that every pixel has the same weight.
+/// Averages over squares of [`FitRules::pool`] pixels, by channel. Pixels outside the mask or the picture count as
+/// black, so that every pixel has the same weight.
 pub fn pooled(rules: &FitRules, picture: &Picture<LinearRgb>, mask: Option<&Mask>) -> [Vec<f64>; 3] {
     let counts = |x, y| mask.is_none_or(|mask| mask.get(x, y));
     [0, 1, 2].map(|channel| averages(rules, picture, channel, counts))
 }
 
-/// The squares of a photo in one channel: first those of pixels that are not clipped, then those of pixels that are. Squares
-/// that no pixel counts in are left out.
+/// The squares of a photo in one channel: first those of pixels that are not clipped, then those of pixels that are.
+/// Squares that no pixel counts in are left out.
 struct Rows<'a> {
     rules: &'a FitRules,
     target: &'a FitTarget<'a>,
@@ -421,8 +421,8 @@ mod tests {
         assert!(error(&fit_lights(&rules(), &basis(), &faint(&photo, None)).unwrap()) > 0.1, "the twin passes");
     }
 
-    /// Highlights far above what clips do not move the weights, whatever their height, and neither does clipping them in the
-    /// photo. With an exposure at which nothing clips they do.
+    /// Highlights far above what clips do not move the weights, whatever their height, and neither does clipping them
+    /// in the photo. With an exposure at which nothing clips they do.
     #[test]
     fn the_height_of_clipped_highlights_does_not_count() {
         let plain = basis().weighted(&WEIGHTS).unwrap();

@@ -1,13 +1,13 @@
 //! Positions of lights in a room whose own lamps are unknown.
 //!
-//! In: a world, its architecture, the cameras of all views. Out: named quads: a grid under the ceiling, one quad behind the
-//! camera, one in front of each wall that no view sees. The layout follows PSDR-Room (Yan et al., SIGGRAPH Asia 2023), whose
-//! constants are not published; ours are [`StageRules`]. No light lies in a view, and none casts a shadow.
+//! In: a world, its architecture, the cameras of all views. Out: named quads: a grid under the ceiling, one quad behind
+//! the camera, one in front of each wall that no view sees. The layout follows PSDR-Room (Yan et al., SIGGRAPH Asia
+//! 2023), whose constants are not published; ours are [`StageRules`]. No light lies in a view, and none casts a shadow.
 //!
-//! A wall is an upright piece of the architecture, in one plane and connected. It grows from the largest triangle that belongs to
-//! none yet. It takes in every triangle of that triangle's plane that is connected with it: no farther from one of its triangles
-//! than the tolerance, so that they share a corner or an edge, touch or overlap. Coplanar walls of different rooms are different
-//! walls.
+//! A wall is an upright piece of the architecture, in one plane and connected. It grows from the largest triangle that
+//! belongs to none yet. It takes in every triangle of that triangle's plane that is connected with it: no farther from
+//! one of its triangles than the tolerance, so that they share a corner or an edge, touch or overlap. Coplanar walls of
+//! different rooms are different walls.
 
 use glam::{DVec2, DVec3, Vec3};
 use mateval_scene::dataset::SceneFile;
@@ -42,8 +42,8 @@ pub struct StageRules {
     /// Sine of the largest angle between a ceiling's normal and the vertical, and between a wall's normal and the
     /// horizontal, and between the normals of one wall's triangles and of its largest one.
     pub upright_sine: f64,
-    /// The largest distance of a wall's corners from the plane of its largest triangle, and the largest gap within that plane
-    /// between connected triangles.
+    /// The largest distance of a wall's corners from the plane of its largest triangle, and the largest gap within that
+    /// plane between connected triangles.
     pub same_plane_m: f64,
     /// A place is visible if nothing is nearer to the camera than the place by more than this.
     pub visible_within_m: f64,
@@ -78,16 +78,17 @@ pub struct NamedLight {
     pub light: StageLight,
 }
 
-/// The lights of a scene's stage, for all views of the scene from the input camera's place: a stage does not depend on wide
-/// views. Instances that belong to the building may be walls; no other instance is one. `world` holds a surface for each instance, in the order of the instances.
+/// The lights of a scene's stage, for all views of the scene from the input camera's place: a stage does not depend on
+/// wide views. Instances that belong to the building may be walls; no other instance is one. `world` holds a surface
+/// for each instance, in the order of the instances.
 pub fn scene_lights(rules: &StageRules, scene: &SceneFile, world: &World) -> Vec<NamedLight> {
     let views = scene.views.iter().filter(|view| !view.id.is_wide());
     let cameras: Vec<Camera> = views.map(|view| view.camera).collect();
     lights(rules, world, &scene.architecture(), &cameras)
 }
 
-/// The lights of a stage. `architecture` lists the surfaces of the world that may be walls. `cameras` holds the cameras of
-/// all views, the input view's first; there is at least one, and all stand in one place or close to it.
+/// The lights of a stage. `architecture` lists the surfaces of the world that may be walls. `cameras` holds the cameras
+/// of all views, the input view's first; there is at least one, and all stand in one place or close to it.
 pub fn lights(rules: &StageRules, world: &World, architecture: &[usize], cameras: &[Camera]) -> Vec<NamedLight> {
     let room = LitRoom { rules, world, centre: cameras[0].position() };
     let mut lights = room.ceiling_lights(cameras);
@@ -157,7 +158,8 @@ impl LitRoom<'_> {
         extent
     }
 
-    /// The height of the level ceiling above `place`; none where `place` is hidden from the centre or has no such ceiling.
+    /// The height of the level ceiling above `place`; none where `place` is hidden from the centre or has no such
+    /// ceiling.
     fn ceiling_above(&self, place: DVec3) -> Option<f64> {
         if !self.sees(place) {
             return None;
@@ -245,8 +247,8 @@ impl Upright {
     }
 }
 
-/// The rectangle around each wall of at least [`StageRules::least_wall_m`] in width and height; the wall with the largest
-/// triangle first.
+/// The rectangle around each wall of at least [`StageRules::least_wall_m`] in width and height; the wall with the
+/// largest triangle first.
 fn walls(rules: &StageRules, triangles: impl Iterator<Item = [DVec3; 3]>) -> Vec<Rectangle> {
     let mut rest: Vec<Upright> = triangles.filter_map(|corners| Upright::new(rules, corners)).collect();
     rest.sort_by(|a, b| b.area.total_cmp(&a.area));
@@ -258,7 +260,8 @@ fn walls(rules: &StageRules, triangles: impl Iterator<Item = [DVec3; 3]>) -> Vec
     walls
 }
 
-/// Takes the triangles of the wall around `seed` out of `rest`; returns the rectangle around them if it is large enough.
+/// Takes the triangles of the wall around `seed` out of `rest`; returns the rectangle around them if it is large
+/// enough.
 fn grown(rules: &StageRules, seed: &Upright, rest: &mut Vec<Upright>) -> Option<Rectangle> {
     let up = (DVec3::Y - seed.normal * seed.normal.y).normalize();
     let along = up.cross(seed.normal);
@@ -350,8 +353,8 @@ impl Rectangle {
         StageLight { mesh, radiance: [1.0; 3] }
     }
 
-    /// Whether any of the rectangle is in the camera's picture, occlusion aside: clips the rectangle at each side of the
-    /// picture (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974) and checks that something remains.
+    /// Whether any of the rectangle is in the camera's picture, occlusion aside: clips the rectangle at each side of
+    /// the picture (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974) and checks that something remains.
     fn meets_frustum(&self, camera: &Camera) -> bool {
         let mut polygon = self.corners().to_vec();
         for plane in frustum(camera) {
@@ -428,8 +431,8 @@ mod tests {
     #[test]
     fn an_empty_room() {
         let lights = lights(&rules(), &world(Vec::new()), &WALLS, &[box_camera()]);
-        // Four columns; the picture's upper edge rises by 0.325 a metre: the ceiling, 1.3 above, is in view from 4 metres
-        // before the camera on. Cells end 0.25 beyond their middles, which are at 0.5, 1.5, ...
+        // Four columns; the picture's upper edge rises by 0.325 a metre: the ceiling, 1.3 above, is in view from 4
+        // metres before the camera on. Cells end 0.25 beyond their middles, which are at 0.5, 1.5, ...
         let ceiling = named(&lights, "ceiling");
         assert_eq!(ceiling.len(), 4 * 3, "{:?}", ceiling.iter().map(|l| &l.name).collect::<Vec<_>>());
         for NamedLight { light, .. } in &ceiling {
@@ -474,8 +477,8 @@ mod tests {
         assert_eq!(walls.iter().filter(|wall| normal(&wall.light).x.abs() > 0.99).count(), 2);
     }
 
-    /// The names of the lights in a room whose architecture is a piece of furniture or a wall that no view sees: a screen behind
-    /// the camera, of the given role and without a category.
+    /// The names of the lights in a room whose architecture is a piece of furniture or a wall that no view sees: a
+    /// screen behind the camera, of the given role and without a category.
     fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
         let screen = box_quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
         let world = world(vec![screen]);
@@ -525,7 +528,8 @@ mod tests {
         }
     }
 
-    /// Furniture without a category is no wall: it gets no light, and hides the wall behind it, which then gets none either.
+    /// Furniture without a category is no wall: it gets no light, and hides the wall behind it, which then gets none
+    /// either.
     #[test]
     fn only_architecture_gets_wall_lights() {
         for role in [Role::Furniture {}, Role::LightFixture {}, Role::Other {}] {

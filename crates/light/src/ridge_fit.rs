@@ -1,14 +1,15 @@
 //! The non-negative multiples of a start whose sum of columns is nearest to a target, with a ridge towards the start.
 //!
-//! min over x >= 0 of sum_i f_i(t_i - (C x)_i) + w sum_e (x_e - 1)^2, where f_i(d) = |d| in ordinary rows and max(0, d) in
-//! rows whose target is a lower bound. The second term is Tikhonov's regularisation towards a start (Hansen, "Rank-Deficient
-//! and Discrete Ill-Posed Problems", SIAM 1998, section 5.1), so the minimum is unique. Solved by Mehrotra's primal-dual
-//! interior-point method ("On the implementation of a primal-dual interior point method", SIAM J. Optim. 2, 1992); each step
-//! solves for as many unknowns as there are columns.
+//! min over x >= 0 of sum_i f_i(t_i - (C x)_i) + w sum_e (x_e - 1)^2, where f_i(d) = |d| in ordinary rows and max(0, d)
+//! in rows whose target is a lower bound. The second term is Tikhonov's regularisation towards a start (Hansen,
+//! "Rank-Deficient and Discrete Ill-Posed Problems", SIAM 1998, section 5.1), so the minimum is unique. Solved by
+//! Mehrotra's primal-dual interior-point method ("On the implementation of a primal-dual interior point method", SIAM
+//! J. Optim. 2, 1992); each step solves for as many unknowns as there are columns.
 //!
-//! f_i(d) is the maximum of y d over y in -1..1, or in 0..1 for a lower bound. Swapping minimum and maximum gives the dual:
-//! every such y bounds the objective from below by t.y + sum_e min over x_e >= 0 of (w (x_e - 1)^2 - g_e x_e), g = C^T y. The
-//! inner minimum lies at x_e = max(0, 1 + g_e / 2w). So a dual certifies the answer: anybody can check it with two products.
+//! f_i(d) is the maximum of y d over y in -1..1, or in 0..1 for a lower bound. Swapping minimum and maximum gives the
+//! dual: every such y bounds the objective from below by t.y + sum_e min over x_e >= 0 of (w (x_e - 1)^2 - g_e x_e), g
+//! = C^T y. The inner minimum lies at x_e = max(0, 1 + g_e / 2w). So a dual certifies the answer: anybody can check it
+//! with two products.
 //!
 //! Only +, -, *, / and square roots of f64 in a fixed order: the same bytes on every machine.
 
@@ -124,8 +125,8 @@ struct Scaled {
     curvature: f64,
 }
 
-/// min sum(u - l v) + (c / 2) |r - 1|^2, C r + u - v = t with multiplier y; r, u, v >= 0 with multipliers z, 1 - y and y - l,
-/// where l is the least dual and c the curvature.
+/// min sum(u - l v) + (c / 2) |r - 1|^2, C r + u - v = t with multiplier y; r, u, v >= 0 with multipliers z, 1 - y and
+/// y - l, where l is the least dual and c the curvature.
 #[derive(Clone, Debug, Default)]
 struct Point {
     r: Vec<f64>,

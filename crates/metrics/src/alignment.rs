@@ -4,8 +4,9 @@
 
 use mateval_image::{LinearRgb, Mask, Picture};
 
-/// The scale of each channel that brings `prediction` nearest to `reference` in the mean square over the mask, in linear
-/// light: sum(gt * p) / sum(p * p); 1 where the denominator is 0. (Stanford-ORB's definition, applied to each picture alone.)
+/// The scale of each channel that brings `prediction` nearest to `reference` in the mean square over the mask, in
+/// linear light: sum(gt * p) / sum(p * p); 1 where the denominator is 0. (Stanford-ORB's definition, applied to each
+/// picture alone.)
 pub fn channel_scales(prediction: &Picture<LinearRgb>, reference: &Picture<LinearRgb>, mask: &Mask) -> [f64; 3] {
     let mut products = [0.0_f64; 3];
     let mut squares = [0.0_f64; 3];

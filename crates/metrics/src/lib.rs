@@ -8,7 +8,8 @@
 //! 2004), [`flip()`] compares what an observer sees at a distance (Andersson et al. 2020), and [`lpips`] compares the
 //! responses of two trained networks (Zhang et al. 2018). The windows and filters of the last three reach across the
 //! mask's edge: [`pixel`] holds the two ways to fill the pixels outside. FLIP has the reference's there, and SSIM and
-//! LPIPS have two rules each ([`mask_rule`]). [`alignment`] takes the scale of each channel away before colours are compared.
+//! LPIPS have two rules each ([`mask_rule`]). [`alignment`] takes the scale of each channel away before colours are
+//! compared.
 //!
 //! Means are summed in `f64` in a fixed order, so the number of threads changes no bit. A NaN or infinite value inside
 //! the mask is an error. Values outside the mask are not read, save the reference's where they fill the prediction.

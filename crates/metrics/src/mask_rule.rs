@@ -77,7 +77,8 @@ fn windows(inside: Option<MaskedSsim>) -> Counted {
 pub struct ReferenceFeatures(Mutex<Vec<(Option<Mask>, Arc<Features>)>>);
 
 impl ReferenceFeatures {
-    /// Those of the whole reference; absent if it is too small for the network. The reference is the same at every call.
+    /// Those of the whole reference; absent if it is too small for the network. The reference is the same at every
+    /// call.
     pub fn whole(&self, lpips: &Lpips, reference: &Picture<SrgbRgb>) -> Result<Option<Arc<Features>>, MetricError> {
         self.of(None, || lpips.features(reference))
     }

@@ -1,5 +1,5 @@
-//! The trait of pixels that can be compared, the checks that every metric begins with, and two ways to fill the pixels outside
-//! a mask, for metrics whose windows reach across its edge.
+//! The trait of pixels that can be compared, the checks that every metric begins with, and two ways to fill the pixels
+//! outside a mask, for metrics whose windows reach across its edge.
 
 use std::path::PathBuf;
 

@@ -81,8 +81,8 @@ fn check_uv(has_atlas: bool, node: &GlbNode, faults: &mut Faults) {
     }
 }
 
-/// The part of each triangle. The parts of an instance must hold its triangles in their order: each triangle is the next
-/// one of exactly one part. `owned` holds for each instance the indices of its parts.
+/// The part of each triangle. The parts of an instance must hold its triangles in their order: each triangle is the
+/// next one of exactly one part. `owned` holds for each instance the indices of its parts.
 fn parts_of_triangles(
     instances: &[GlbNode],
     owned: impl Iterator<Item = Vec<usize>>,

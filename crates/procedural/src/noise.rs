@@ -1,10 +1,10 @@
 //! The noises of MaterialX' standard library, which are those of Open Shading Language, with their derivatives.
 //!
-//! All of them hash the whole numbers of a lattice's cells, by Bob Jenkins' `lookup3` (burtleburtle.net/bob/c/lookup3.c,
-//! public domain), as Open Shading Language seeds it. [`cell`] is constant in each cell. [`perlin`] is Perlin's
-//! improved gradient noise in two dimensions (Perlin 2002, "Improving noise"), with OSL's gradients and scale, of which
-//! [`fractal`] sums octaves. [`distance`] and [`nearest_cell`] are Worley's cellular noise in two dimensions (Worley
-//! 1996, "A cellular texture basis function"): each cell has one random point.
+//! All of them hash the whole numbers of a lattice's cells, by Bob Jenkins' `lookup3`
+//! (burtleburtle.net/bob/c/lookup3.c, public domain), as Open Shading Language seeds it. [`cell`] is constant in each
+//! cell. [`perlin`] is Perlin's improved gradient noise in two dimensions (Perlin 2002, "Improving noise"), with OSL's
+//! gradients and scale, of which [`fractal`] sums octaves. [`distance`] and [`nearest_cell`] are Worley's cellular
+//! noise in two dimensions (Worley 1996, "A cellular texture basis function"): each cell has one random point.
 
 /// A number from 0 to 1 that is constant in each cell.
 pub fn cell(x: f64, y: f64) -> f64 {

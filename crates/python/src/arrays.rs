@@ -1,5 +1,5 @@
-//! Arrays of NumPy: pictures and lists of vectors as arrays, pictures of a view read detached from Python, and maps that Python
-//! gives, whose dtype decides how they are stored.
+//! Arrays of NumPy: pictures and lists of vectors as arrays, pictures of a view read detached from Python, and maps
+//! that Python gives, whose dtype decides how they are stored.
 
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -79,8 +79,8 @@ pub struct MapInput {
 }
 
 impl MapInput {
-    /// Copies the array. Fails for anything but an array of the dtypes of [`Numbers`], and for one of more numbers than a
-    /// picture may have: views such as those of `numpy.broadcast_to` may be larger than memory.
+    /// Copies the array. Fails for anything but an array of the dtypes of [`Numbers`], and for one of more numbers than
+    /// a picture may have: views such as those of `numpy.broadcast_to` may be larger than memory.
     pub fn new(name: &'static str, given: &Bound<'_, PyAny>) -> PyResult<Self> {
         let Ok(array) = given.cast::<PyUntypedArray>() else {
             let found = given.get_type().fully_qualified_name()?;

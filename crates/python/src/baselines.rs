@@ -1,5 +1,5 @@
-//! The baselines `nn` and `procedural` on arrays, as `mateval.lift` and `mateval.procedural`, and `delight` on a scene's photo,
-//! as `mateval.delight`.
+//! The baselines `nn` and `procedural` on arrays, as `mateval.lift` and `mateval.procedural`, and `delight` on a
+//! scene's photo, as `mateval.delight`.
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -52,8 +52,8 @@ pub(crate) struct MadeMaps {
 /// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. At least one of them must be given.
 ///
 /// neighbours is the number of seen points that an unseen texel is computed from, normal_weight the distance in metres
-/// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side of
-/// all maps in texels; None is the dataset's own size of each.
+/// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side
+/// of all maps in texels; None is the dataset's own size of each.
 ///
 /// Returns the maps by the id of the instance, in the scene's order.
 #[pyfunction]

@@ -1,5 +1,5 @@
-//! A dataset: scenes by their ids, with their instances, parts and views by theirs. The Python class `mateval.Dataset` makes
-//! it a mapping.
+//! A dataset: scenes by their ids, with their instances, parts and views by theirs. The Python class `mateval.Dataset`
+//! makes it a mapping.
 
 use std::path::PathBuf;
 use std::sync::Arc;

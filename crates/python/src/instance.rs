@@ -1,4 +1,5 @@
-//! An instance, its parts and its mesh; and the scene that all Python objects made from it share, which keeps the meshes.
+//! An instance, its parts and its mesh; and the scene that all Python objects made from it share, which keeps the
+//! meshes.
 
 use std::sync::{Arc, OnceLock};
 
@@ -157,8 +158,8 @@ impl Mesh {
         normals.map(|all| rows(py, all.iter().map(|normal| normal.to_array()))).transpose()
     }
 
-    /// The atlas: (vertices, 2), float32. u runs to the right, v up from the bottom, as in trimesh and OBJ: the row of a
-    /// map is (1 - v) * side. None for instances without an atlas.
+    /// The atlas: (vertices, 2), float32. u runs to the right, v up from the bottom, as in trimesh and OBJ: the row of
+    /// a map is (1 - v) * side. None for instances without an atlas.
     #[getter]
     fn uv<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let uvs = self.0.uvs.as_ref();

@@ -1,8 +1,8 @@
 //! The extension module `mateval._core` of the Python package.
 //!
 //! In: a dataset's folder, NumPy arrays. Out: NumPy arrays, a submission, reports, and Python exceptions with the text
-//! that the command would print. The libraries do all the work. This crate converts values (`arrays`) and makes long work
-//! stop for Ctrl-C and survive `fork` (`long_work`).
+//! that the command would print. The libraries do all the work. This crate converts values (`arrays`) and makes long
+//! work stop for Ctrl-C and survive `fork` (`long_work`).
 //!
 //! What needs no Rust is written in Python, in `python/mateval`.
 

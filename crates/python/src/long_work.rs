@@ -5,9 +5,9 @@
 //! the call returns at once. The work itself ends at its next report of progress, by unwinding; until then it takes
 //! processor time, but nobody sees its result, and later calls have other threads.
 //!
-//! There is one pool for each process. `fork` copies the memory of a pool but none of its threads, so a child that used its parent's pool would wait for ever.
-//! PyTorch's data loaders fork. Each process therefore gets its own pool when it first needs one, and the global pool of
-//! rayon is never used.
+//! There is one pool for each process. `fork` copies the memory of a pool but none of its threads, so a child that used
+//! its parent's pool would wait for ever. PyTorch's data loaders fork. Each process therefore gets its own pool when it
+//! first needs one, and the global pool of rayon is never used.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,5 +1,5 @@
-//! The command's reports as JSON texts, which Python parses, `mateval.lint` and `mateval.score`; and the scorer's metrics of two
-//! arrays.
+//! The command's reports as JSON texts, which Python parses, `mateval.lint` and `mateval.score`; and the scorer's
+//! metrics of two arrays.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -114,9 +114,10 @@ impl Pair {
     }
 }
 
-/// The peak signal-to-noise ratio in dB, at most 100, of arrays of shape (height, width, 3) or (height, width) whose peak
-/// is 1. Values are compared as they are; uint8 and uint16 are divided by their largest value. The scorer compares linear
-/// values of albedo. Where mask, (height, width) of bool, is given, only its pixels count; None where there are none.
+/// The peak signal-to-noise ratio in dB, at most 100, of arrays of shape (height, width, 3) or (height, width) whose
+/// peak is 1. Values are compared as they are; uint8 and uint16 are divided by their largest value. The scorer compares
+/// linear values of albedo. Where mask, (height, width) of bool, is given, only its pixels count; None where there are
+/// none.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
 pub fn psnr(
@@ -132,9 +133,9 @@ pub fn psnr(
     measured(py, Pair::new(prediction, reference)?, mask, of, of)
 }
 
-/// The structural similarity in windows of 11x11 pixels, of arrays as `psnr` takes them, at least 11 pixels wide and high.
-/// The scorer compares sRGB-encoded albedo. Where mask is given, only windows that lie wholly inside it count; None where
-/// there are none.
+/// The structural similarity in windows of 11x11 pixels, of arrays as `psnr` takes them, at least 11 pixels wide and
+/// high. The scorer compares sRGB-encoded albedo. Where mask is given, only windows that lie wholly inside it count;
+/// None where there are none.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
 pub fn ssim(
@@ -170,8 +171,8 @@ fn measured(
     run_long(py, move |_| work())?.map_err(failed)
 }
 
-/// LPIPS 0.1 with AlexNet, of sRGB-encoded arrays of shape (height, width, 3). Where mask is given, the mean is over its
-/// pixels; None where there are none. Fails where the network's weights were not fetched.
+/// LPIPS 0.1 with AlexNet, of sRGB-encoded arrays of shape (height, width, 3). Where mask is given, the mean is over
+/// its pixels; None where there are none. Fails where the network's weights were not fetched.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
 pub fn lpips(

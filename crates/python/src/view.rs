@@ -233,8 +233,8 @@ impl Truth {
         plane(py, &read_picture(py, self.path("specular_region.png"), &self.view().camera, png_io::read_mask)?)
     }
 
-    /// The picture of the photo's renderer, linear radiance in Rec. 709 before exposure: (height, width, 3), float32. Raises
-    /// MatEvalError where the scene is not rendered.
+    /// The picture of the photo's renderer, linear radiance in Rec. 709 before exposure: (height, width, 3), float32.
+    /// Raises MatEvalError where the scene is not rendered.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let dataset = &self.source.dataset;
@@ -285,8 +285,8 @@ impl Camera {
         rows(py, self.0.world_from_camera.into_iter().map(|[x, y, z, position]| [x, -y, -z, position]))
     }
 
-    /// Projects world points of shape (..., 3), in metres. Returns their positions in the picture, (..., 2) in pixels from
-    /// the top left, and their depths along the camera's axis, (...) in metres; NaN for points behind the camera.
+    /// Projects world points of shape (..., 3), in metres. Returns their positions in the picture, (..., 2) in pixels
+    /// from the top left, and their depths along the camera's axis, (...) in metres; NaN for points behind the camera.
     #[expect(clippy::type_complexity, reason = "a tuple of arrays, as NumPy's own functions return")]
     fn project<'py>(
         &self,
@@ -308,8 +308,9 @@ impl Camera {
         Ok((shaped(py, pixels.into_flattened(), &with_axes)?, shaped(py, depths, &outer)?))
     }
 
-    /// The world points, (height, width, 3) in metres, at the centres of the pixels of a depth picture of shape (height,
-    /// width), in metres along the camera's axis; NaN where the depth is not above 0, as where nothing was hit.
+    /// The world points, (height, width, 3) in metres, at the centres of the pixels of a depth picture of shape
+    /// (height, width), in metres along the camera's axis; NaN where the depth is not above 0, as where nothing was
+    /// hit.
     fn unproject<'py>(
         &self,
         py: Python<'py>,

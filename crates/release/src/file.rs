@@ -1,9 +1,9 @@
 //! `release.json`: everything that the report of a release states, for programs.
 //!
 //! Here are also the facts about a publication that its files do not hold, with the citation, and what must not become
-//! public while the ground truth is withheld: everything that was measured on it in single scenes, and every sentence that
-//! may quote it. What remains of it are means over scenes, as a leaderboard shows them too, the counts of checks, and the
-//! settings of the renderer.
+//! public while the ground truth is withheld: everything that was measured on it in single scenes, and every sentence
+//! that may quote it. What remains of it are means over scenes, as a leaderboard shows them too, the counts of checks,
+//! and the settings of the renderer.
 
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -38,8 +38,8 @@ pub struct ReleaseFile {
     pub publication: Publication,
     /// An entry for BibTeX.
     pub citation: String,
-    /// The commitment to the ground truth, if it is withheld; then everything that was measured on it is null, except for
-    /// means over at least two scenes and the counts of checks.
+    /// The commitment to the ground truth, if it is withheld; then everything that was measured on it is null, except
+    /// for means over at least two scenes and the counts of checks.
     pub withheld: Option<Withheld>,
     /// The counts of the dataset.
     pub stats: StatsFile,
@@ -119,8 +119,8 @@ pub struct ReleasedScene {
 }
 
 impl ReleaseFile {
-    /// Whether nothing in the report speaks against the release: the dataset is sound, and every comparison that was given
-    /// agrees.
+    /// Whether nothing in the report speaks against the release: the dataset is sound, and every comparison that was
+    /// given agrees.
     pub fn is_good(&self) -> bool {
         self.verification.sound && self.comparisons().all(|verdict| verdict.agrees)
     }

@@ -37,8 +37,8 @@ pub struct ViewNoise {
     pub mean_of_halves_mse: f64,
     /// As in `render.json`: linear, before exposure; may be below 0.
     pub denoised_mse: f64,
-    /// PSNR of the mean of the halves against the picture without noise, in dB: linear, with the scene's exposure, peak 1.
-    /// Null where there is no noise.
+    /// PSNR of the mean of the halves against the picture without noise, in dB: linear, with the scene's exposure, peak
+    /// 1. Null where there is no noise.
     pub mean_of_halves_psnr_db: Option<f64>,
 }
 
@@ -187,7 +187,8 @@ fn reduced(picture: &Picture<LinearRgb>) -> Picture<LinearRgb> {
 pub struct SceneInputs {
     /// Number of files.
     pub files: usize,
-    /// SHA-256, in hexadecimal, of a line `<sha256>  <path>` for each of `source.files` in `scene.json`, in their order.
+    /// SHA-256, in hexadecimal, of a line `<sha256>  <path>` for each of `source.files` in `scene.json`, in their
+    /// order.
     pub sha256: String,
 }
 

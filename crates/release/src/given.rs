@@ -1,7 +1,7 @@
 //! The files that are given for a release's report, each of which must be about its dataset.
 //!
-//! These are the verdicts of `prep compare`, whether two renderers agree on a scene; and the results that give the ceiling
-//! and the floor, the scores of the truth itself and of a constant estimate.
+//! These are the verdicts of `prep compare`, whether two renderers agree on a scene; and the results that give the
+//! ceiling and the floor, the scores of the truth itself and of a constant estimate.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 /// Why a release could not be described.
 #[derive(Debug, thiserror::Error)]
 pub enum ReleaseError {
-    /// Files that were given are not about this dataset, or are something else: every reason. Correct them, or leave them
-    /// out.
+    /// Files that were given are not about this dataset, or are something else: every reason. Correct them, or leave
+    /// them out.
     #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
     #[error(
@@ -349,8 +349,8 @@ fn unfit(path: &Path, place: &str, message: String) -> Finding {
     }
 }
 
-/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends the
-/// reading.
+/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends
+/// the reading.
 fn fitting<T>(
     read: Result<T, SceneError>,
     expected: &str,

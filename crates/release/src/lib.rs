@@ -1,13 +1,14 @@
 //! Describes the release of a dataset on a page that can be cited.
 //!
 //! In: a dataset with its `.build`, and optionally verdicts of `prep compare`, results of the truth and of a constant
-//! estimate, and facts about the publication. Out: a folder with `index.html`, `release.json` ([`ReleaseFile`]) and small
-//! pictures.
+//! estimate, and facts about the publication. Out: a folder with `index.html`, `release.json` ([`ReleaseFile`]) and
+//! small pictures.
 //!
-//! [`CheckedRelease::new`] reads and checks everything that is given ([`given`]) before [`CheckedRelease::write`] verifies
-//! the dataset and gathers the rest ([`gathered`]): counts beside the paper's, the noise of the photo's renderer, licences
-//! and hashes of the inputs, commands, and pictures. [`file`] holds what is written, with the citation; if the ground truth
-//! is withheld, it removes what was measured on it. `page` and `page_scene` fill the template.
+//! [`CheckedRelease::new`] reads and checks everything that is given ([`given`]) before [`CheckedRelease::write`]
+//! verifies the dataset and gathers the rest ([`gathered`]): counts beside the paper's, the noise of the photo's
+//! renderer, licences and hashes of the inputs, commands, and pictures. [`file`] holds what is written, with the
+//! citation; if the ground truth is withheld, it removes what was measured on it. `page` and `page_scene` fill the
+//! template.
 //!
 //! Nothing depends on a clock: the same inputs give the same bytes.
 
@@ -66,7 +67,8 @@ pub struct CheckedRelease<'a> {
 }
 
 impl<'a> CheckedRelease<'a> {
-    /// Checks everything that can fail early: the report's place, that the dataset is whole, and all files that are given.
+    /// Checks everything that can fail early: the report's place, that the dataset is whole, and all files that are
+    /// given.
     pub fn new(options: &'a ReleaseOptions) -> Result<Self, ReleaseError> {
         let dataset = Dataset::open(&options.dataset)?;
         dataset.check_whole()?;

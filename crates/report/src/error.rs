@@ -1,5 +1,5 @@
-//! The error of this crate, split by what a caller can do about it, and why a result cannot stand beside another one, or
-//! does not match the dataset or the submission that it names.
+//! The error of this crate, split by what a caller can do about it, and why a result cannot stand beside another one,
+//! or does not match the dataset or the submission that it names.
 
 use std::fmt;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! Shows results to people.
 //!
 //! In: results; for pictures also the dataset and the submissions. Out: tables ([`tables`]), ranks with intervals
-//! ([`ranking`]), a site ([`leaderboard`]), pictures side by side ([`strips`]), an explanation of where and how the albedo
-//! of a scene errs ([`explain`]), the metrics of two picture files ([`pair`]). Results that contradict each other, or what
-//! they are shown with, are refused with every reason ([`error`]).
+//! ([`ranking`]), a site ([`leaderboard`]), pictures side by side ([`strips`]), an explanation of where and how the
+//! albedo of a scene errs ([`explain`]), the metrics of two picture files ([`pair`]). Results that contradict each
+//! other, or what they are shown with, are refused with every reason ([`error`]).
 
 pub mod error;
 pub mod explain;

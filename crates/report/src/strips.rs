@@ -3,6 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_eval::protocol::{Protocol, SampleRules, Track};
+use mateval_eval::result::key::PictureKind;
+use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
+use mateval_eval::truth::ViewTruth;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
 use mateval_scene::dataset::SceneFile;
@@ -11,11 +15,6 @@ use mateval_scene::work_folder::check_free;
 use mateval_scene::{Progress, Report, SceneError, SceneId};
 
 use crate::error::ReportError;
-use mateval_eval::protocol::Protocol;
-use mateval_eval::protocol::{SampleRules, Track};
-use mateval_eval::result::key::PictureKind;
-use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
-use mateval_eval::truth::ViewTruth;
 
 /// In novel views, pixels that the input view sees are darkened to this share of their sRGB values.
 const OBSERVED_SHARE: f32 = 0.4;

@@ -6,8 +6,8 @@
 //!
 //! The bytes are the same on every machine.
 //!
-//! `solid` builds meshes and combines them into furniture, `pattern` paints the textures, and `room` places the furniture
-//! and writes the XML. `house` also uses the first two.
+//! `solid` builds meshes and combines them into furniture, `pattern` paints the textures, and `room` places the
+//! furniture and writes the XML. `house` also uses the first two.
 
 pub mod house;
 pub mod pattern;

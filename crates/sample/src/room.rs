@@ -1,7 +1,7 @@
 //! The room as a Mitsuba scene: its objects, where they stand, their materials, and the XML.
 //!
-//! The room spans x 0..4, y 0..2.6, z 0..3.2 metres. The wallpaper and the mirror are at x = 0, the window at z = 0, and
-//! the camera is in the opposite corner.
+//! The room spans x 0..4, y 0..2.6, z 0..3.2 metres. The wallpaper and the mirror are at x = 0, the window at z = 0,
+//! and the camera is in the opposite corner.
 
 use std::fmt::Write as _;
 

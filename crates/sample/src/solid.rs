@@ -1,5 +1,5 @@
-//! Meshes: [`Solid`], which the scenes' geometry is built of, and the furniture that both scenes use, in metres, +y up, fronts
-//! towards +z, with the origin on the floor below the object.
+//! Meshes: [`Solid`], which the scenes' geometry is built of, and the furniture that both scenes use, in metres, +y up,
+//! fronts towards +z, with the origin on the floor below the object.
 
 use std::fmt::Write as _;
 
@@ -35,8 +35,8 @@ impl Solid {
         self.faces.push((first..first + corners.len()).collect());
     }
 
-    /// Adds a rectangle that spans `right` and `up` from `corner` and faces their cross product. One unit of uv is `tile`
-    /// metres.
+    /// Adds a rectangle that spans `right` and `up` from `corner` and faces their cross product. One unit of uv is
+    /// `tile` metres.
     pub fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, tile: DVec2) -> Self {
         let normal = right.cross(up).normalize();
         let size = DVec2::new(right.length(), up.length()) / tile;
@@ -82,8 +82,8 @@ impl Solid {
         self
     }
 
-    /// Adds the surface of revolution of a profile of (radius, height), given from bottom to top, about the vertical axis
-    /// through `foot`. It faces outwards.
+    /// Adds the surface of revolution of a profile of (radius, height), given from bottom to top, about the vertical
+    /// axis through `foot`. It faces outwards.
     pub fn turned(mut self, foot: DVec3, profile: &[(f64, f64)], segments: usize, tile: f64) -> Self {
         let turn = |step: usize| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * (step % segments) as f64 / segments as f64);

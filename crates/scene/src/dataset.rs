@@ -1,5 +1,5 @@
-//! The types of a dataset's JSON files, which `dataset_spec/FORMAT.md` documents for readers of the files: the dataset, its
-//! scenes, the roles of their instances, and how perturbed geometry differs from the true one.
+//! The types of a dataset's JSON files, which `dataset_spec/FORMAT.md` documents for readers of the files: the dataset,
+//! its scenes, the roles of their instances, and how perturbed geometry differs from the true one.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -32,8 +32,8 @@ pub struct DatasetFile {
     pub tool: String,
     /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
     pub scenes: Vec<SceneId>,
-    /// The renderer that made the input pictures (`input/rgb`); null until all scenes without a photo from elsewhere are
-    /// rendered, and where all scenes have one.
+    /// The renderer that made the input pictures (`input/rgb`); null until all scenes without a photo from elsewhere
+    /// are rendered, and where all scenes have one.
     pub photo_renderer: Option<RendererId>,
     /// Licence and credit of every scene.
     pub licences: Vec<Licence>,
@@ -129,8 +129,8 @@ pub struct SceneSource {
     pub kind: SourceKind,
     /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
     pub house: String,
-    /// Whether the source states the roughness of its materials. Otherwise that of the truth is a constant of the reader,
-    /// and predictions of roughness are not scored.
+    /// Whether the source states the roughness of its materials. Otherwise that of the truth is a constant of the
+    /// reader, and predictions of roughness are not scored.
     pub states_roughness: bool,
     /// Whether the source states which materials are metallic. Otherwise metallic is not scored.
     pub states_metallic: bool,

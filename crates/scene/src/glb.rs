@@ -41,7 +41,8 @@ pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Grey paint, seen from both sides. It says nothing about the surface; but trimesh drops the uv of what has no material.
+/// Grey paint, seen from both sides. It says nothing about the surface; but trimesh drops the uv of what has no
+/// material.
 fn plain_material() -> json::Material {
     json::Material {
         name: Some("plain".to_owned()),

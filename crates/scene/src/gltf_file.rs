@@ -199,8 +199,8 @@ fn require_others_only(file: &mut Value) {
     }
 }
 
-/// Takes out the references to textures without a picture. Returns their JSON pointers. Fails where the picture exists as
-/// KTX2 alone: without it, the material would be another.
+/// Takes out the references to textures without a picture. Returns their JSON pointers. Fails where the picture exists
+/// as KTX2 alone: without it, the material would be another.
 fn take_textures_without_picture(file: &mut Value) -> Result<Vec<String>, GltfError> {
     let textures = list(file, "textures");
     let absent: Vec<bool> = textures.iter().map(|texture| texture.get("source").is_none()).collect();
@@ -321,8 +321,8 @@ fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
 /// The most bytes of one accessor's contents. One without a buffer view takes none in the file.
 const MOST_BYTES: usize = 1 << 31;
 
-/// The entries of an accessor of `N` numbers each, which may be NaN. Normalized integers stand for 0 to 1, or for -1 to 1
-/// (glTF 2.0, section 3.6.2.2), other integers for themselves.
+/// The entries of an accessor of `N` numbers each, which may be NaN. Normalized integers stand for 0 to 1, or for -1 to
+/// 1 (glTF 2.0, section 3.6.2.2), other integers for themselves.
 pub fn numbers<const N: usize>(
     accessor: &gltf::Accessor<'_>,
     buffers: &[impl AsRef<[u8]>],

@@ -114,8 +114,8 @@ id_type!(
 );
 
 impl ViewId {
-    /// How the ids of views from other places than the input view's begin, and those of no other view. So a result, which
-    /// names a view by its id alone, says for which means it counts.
+    /// How the ids of views from other places than the input view's begin, and those of no other view. So a result,
+    /// which names a view by its id alone, says for which means it counts.
     pub const WIDE: &str = "wide_";
 
     /// Whether it is the id of a view from another place than the input view's.

@@ -101,8 +101,8 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
     parse(path, &read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?)
 }
 
-/// Reads a file of the format `expected`. Another format is [`SceneError::Format`], whatever else differs from what this
-/// version reads.
+/// Reads a file of the format `expected`. Another format is [`SceneError::Format`], whatever else differs from what
+/// this version reads.
 pub fn read_format<T: DeserializeOwned>(path: &Path, expected: &'static str) -> Result<T, SceneError> {
     let text = read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?;
     parse_format(path, &text, expected)

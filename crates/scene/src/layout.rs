@@ -1,4 +1,5 @@
-//! The paths of files in a dataset, and of `.build`: what `prep` keeps there to work on it and no reader of a dataset needs.
+//! The paths of files in a dataset, and of `.build`: what `prep` keeps there to work on it and no reader of a dataset
+//! needs.
 
 use std::path::{Path, PathBuf};
 
@@ -11,8 +12,8 @@ pub const TARGETS: &str = "targets.json";
 pub const MANIFEST: &str = "MANIFEST.sha256";
 /// `compare.json`: a verdict about the dataset, which its identity does not cover.
 pub const COMPARE: &str = "compare.json";
-/// The list of a scene's references in `ground_truth/renders/scorer`. It is written last, so its presence means that the
-/// pictures are complete.
+/// The list of a scene's references in `ground_truth/renders/scorer`. It is written last, so its presence means that
+/// the pictures are complete.
 pub const SCORER_JSON: &str = "scorer.json";
 /// The input view's id.
 pub const INPUT: &str = "input";

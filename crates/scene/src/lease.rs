@@ -1,8 +1,8 @@
 //! A lease: the right of one process to change a scene, on file systems that several hosts share.
 //!
 //! It is a file that names its holder and is put in place by a hard link, which succeeds for one process alone, also on
-//! network file systems, where `flock` often does not hold. The holder touches it; one that has not been touched for long
-//! belongs to a lost host and may be broken.
+//! network file systems, where `flock` often does not hold. The holder touches it; one that has not been touched for
+//! long belongs to a lost host and may be broken.
 
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -84,8 +84,8 @@ impl Drop for Lease {
     }
 }
 
-/// Writes the same text again: a write rather than a new time, so that the server's clock counts and not this host's, and
-/// in place, so that a full disk does not empty the file and a removed one is not made again.
+/// Writes the same text again: a write rather than a new time, so that the server's clock counts and not this host's,
+/// and in place, so that a full disk does not empty the file and a removed one is not made again.
 fn write_over(path: &Path, text: &str) -> std::io::Result<()> {
     std::fs::File::options().write(true).open(path)?.write_all(text.as_bytes())
 }

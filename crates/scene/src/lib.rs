@@ -3,12 +3,13 @@
 //! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mod@mesh`], [`material`] and
-//! [`mod@reference`] describe a scene with its materials and lights. [`dataset`], [`layout`], [`manifest`], [`open`] and
-//! [`render_file`] are the files of a dataset, [`submission`] those of a submission. [`obj`], [`gltf_file`] and
+//! [`mod@reference`] describe a scene with its materials and lights. [`dataset`], [`layout`], [`manifest`], [`open`]
+//! and [`render_file`] are the files of a dataset, [`submission`] those of a submission. [`obj`], [`gltf_file`] and
 //! [`source_folder`] read untrusted files; [`work_folder`] and [`lease`] guard what several processes write.
 
 pub mod camera;
 pub mod dataset;
+pub mod error;
 pub mod findings;
 pub mod glb;
 pub mod gltf_file;
@@ -34,7 +35,8 @@ pub mod work_folder;
 
 pub use camera::{Camera, Intrinsics};
 pub use dataset::{Role, SceneLights, SourceKind};
-pub use findings::{Finding, FindingCount, SceneError, Severity};
+pub use error::SceneError;
+pub use findings::{Finding, FindingCount, Severity};
 pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;
 pub use progress::{Progress, Report};

@@ -1,7 +1,7 @@
 //! `MANIFEST.sha256`: a line `<sha256>  <path>` for each file, sorted by path, in the format of `sha256sum -c`.
 //!
-//! [`SceneHashes`] keeps the hashes of one scene's files in `.build`, so that the manifest is written without reading them
-//! again; [`change_scene`] lets one process at a time change a scene without hiding other changes.
+//! [`SceneHashes`] keeps the hashes of one scene's files in `.build`, so that the manifest is written without reading
+//! them again; [`change_scene`] lets one process at a time change a scene without hiding other changes.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
@@ -42,9 +42,8 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files in
-/// `root` itself.
-/// Links to folders are not followed.
+/// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files
+/// in `root` itself. Links to folders are not followed.
 pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
     let mut files = list_below(root, Path::new(""))?;
     files.retain(|file| ![MANIFEST, DATASET, COMPARE].contains(&file.as_str()) && !file.starts_with('.'));
@@ -265,8 +264,8 @@ impl Stamp {
 }
 
 impl SceneHashes {
-    /// The list of a scene. Of a scene that has not changed since the manifest was written, the manifest's hashes count.
-    /// A list that cannot be read counts as missing.
+    /// The list of a scene. Of a scene that has not changed since the manifest was written, the manifest's hashes
+    /// count. A list that cannot be read counts as missing.
     pub fn open(root: &Path, scene: &SceneId) -> Result<Self, SceneError> {
         let build = BuildFolder::of(root);
         let mut files: BTreeMap<String, Listed> = json::read(&build.hashes(scene)).unwrap_or_default();
@@ -295,8 +294,8 @@ impl SceneHashes {
     }
 
     /// Compares the files with the list: each one that is missing, changed or not listed is a finding. Only those are
-    /// compared that `concerns` accepts by their paths in the dataset, and only those are read whose size or times are not
-    /// those of the list.
+    /// compared that `concerns` accepts by their paths in the dataset, and only those are read whose size or times are
+    /// not those of the list.
     pub fn check(&mut self, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
         let mut findings = Vec::new();
         for (file, listed) in self.files.iter_mut().filter(|(file, _)| concerns(file)) {
@@ -381,9 +380,9 @@ fn folder(scene: &SceneId) -> String {
     format!("scenes/{scene}/")
 }
 
-/// Lets `work` write files of the scene, while no other process may, and lists all its files anew. `is_ours` accepts those
-/// that `work` may write, by their paths in the dataset. Fails where any other file is not the one that is listed, since a
-/// later manifest would list it as it is.
+/// Lets `work` write files of the scene, while no other process may, and lists all its files anew. `is_ours` accepts
+/// those that `work` may write, by their paths in the dataset. Fails where any other file is not the one that is
+/// listed, since a later manifest would list it as it is.
 pub fn change_scene<T, E: From<SceneError>>(
     root: &Path,
     scene: &SceneId,
@@ -499,7 +498,8 @@ mod tests {
         assert!(unfinished.exists(), "its owner lives");
     }
 
-    /// The list of a scene that the manifest describes too must not hide another dataset that was unpacked over this one.
+    /// The list of a scene that the manifest describes too must not hide another dataset that was unpacked over this
+    /// one.
     #[test]
     fn the_manifest_counts_where_nothing_was_changed_apart() {
         let (root, id) = scene_with(&[("a", "1")]);

@@ -214,8 +214,8 @@ pub struct BumpMap {
 /// materials).
 pub const CUT_OUT_BELOW_OPACITY: f32 = 0.5;
 
-/// Opacities that are neither none nor whole. What is seen through them is a mixture, which no single colour, depth or id
-/// describes.
+/// Opacities that are neither none nor whole. What is seen through them is a mixture, which no single colour, depth or
+/// id describes.
 pub const FRACTIONAL_OPACITY: std::ops::RangeInclusive<f32> = 0.05..=0.95;
 
 /// A surface's material.
@@ -362,9 +362,9 @@ impl Material {
 
     /// base_color, roughness and metallic at the surface's `uv`; none for dielectrics.
     ///
-    /// Principled materials, which every converted one is, have their own. In a scene with its source's materials, diffuse
-    /// and plastic ones have their reflectance as base_color, and metallic 0; conductors have F0 times specular reflectance,
-    /// and metallic 1. Roughness is the square root of alpha: 0 if smooth, 1 if diffuse.
+    /// Principled materials, which every converted one is, have their own. In a scene with its source's materials,
+    /// diffuse and plastic ones have their reflectance as base_color, and metallic 0; conductors have F0 times specular
+    /// reflectance, and metallic 1. Roughness is the square root of alpha: 0 if smooth, 1 if diffuse.
     pub fn appearance(&self, textures: &[Texture], uv: Vec2) -> Option<Appearance> {
         let rough = |microfacets: &Option<Microfacets>| {
             microfacets.map_or(0.0, |m| m.alpha.at(textures, uv).clamp(0.0, 1.0).sqrt())

@@ -1,5 +1,5 @@
-//! Triangle meshes in world space, the point of a triangle that is nearest to a given point, and the triangle that each texel
-//! of an instance's uv atlas belongs to.
+//! Triangle meshes in world space, the point of a triangle that is nearest to a given point, and the triangle that each
+//! texel of an instance's uv atlas belongs to.
 //!
 //! Texels are counted from the top left; the centre of (x, y) lies at uv ((x + 0.5) / size, 1 - (y + 0.5) / size).
 

@@ -214,8 +214,8 @@ fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ObjError> {
     }
 }
 
-/// The text with LF for every CR that ends a line alone, as old Mac OS writes them: `str::lines` and tobj would read one
-/// line.
+/// The text with LF for every CR that ends a line alone, as old Mac OS writes them: `str::lines` and tobj would read
+/// one line.
 fn with_line_ends(text: Cow<'_, str>) -> Cow<'_, str> {
     let has_bare_cr = text.ends_with('\r') || text.as_bytes().windows(2).any(|two| two[0] == b'\r' && two[1] != b'\n');
     if has_bare_cr { Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n")) } else { text }

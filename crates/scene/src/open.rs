@@ -1,4 +1,5 @@
-//! Opens a dataset: reads and checks its JSON files. [`DatasetId`] states in results and reports which dataset they are about.
+//! Opens a dataset: reads and checks its JSON files. [`DatasetId`] states in results and reports which dataset they are
+//! about.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,8 +22,8 @@ pub struct Dataset {
     pub targets: TargetsFile,
     /// `scene.json` of every scene whose folder exists, in the dataset's order.
     pub scenes: Vec<SceneFile>,
-    /// The scenes that `dataset.json` and the manifest list and whose whole folder is missing, in the dataset's order: each
-    /// scene can be downloaded on its own.
+    /// The scenes that `dataset.json` and the manifest list and whose whole folder is missing, in the dataset's order:
+    /// each scene can be downloaded on its own.
     pub absent: Vec<SceneId>,
 }
 
@@ -104,8 +105,8 @@ impl Dataset {
         Ok(chosen[0])
     }
 
-    /// The renderer that made the scene's input picture; absent if the dataset has no photo renderer, or where the scene has
-    /// a photo from elsewhere, whose light is not known.
+    /// The renderer that made the scene's input picture; absent if the dataset has no photo renderer, or where the
+    /// scene has a photo from elsewhere, whose light is not known.
     pub fn photo_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
         self.file.photo_renderer.as_ref().filter(|_| scene.photo.is_none())
     }

@@ -1,9 +1,9 @@
-//! The reference scene: surfaces with their materials and textures, and the lights. The ground truth is rendered and baked
-//! from it.
+//! The reference scene: surfaces with their materials and textures, and the lights. The ground truth is rendered and
+//! baked from it.
 //!
-//! On disk it is `ground_truth/reference/` and `ground_truth/lights.json`: `geometry.glb` holds a node for each surface with its
-//! source uv, `textures/` holds decoded texels, so that no machine's picture decoder can change them, and `reference.json`
-//! connects the two.
+//! On disk it is `ground_truth/reference/` and `ground_truth/lights.json`: `geometry.glb` holds a node for each surface
+//! with its source uv, `textures/` holds decoded texels, so that no machine's picture decoder can change them, and
+//! `reference.json` connects the two.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -317,8 +317,8 @@ pub fn write_source_materials(folder: &SceneFolder, source: &SourceMaterials) ->
     json::write(&place.join(SOURCE_MATERIALS), &file)
 }
 
-/// Reads the files of [`write_source_materials`]; none where the scene has none. Every index out of range is a finding of
-/// the error; `count` is the number of the scene's materials.
+/// Reads the files of [`write_source_materials`]; none where the scene has none. Every index out of range is a finding
+/// of the error; `count` is the number of the scene's materials.
 pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Option<SourceMaterials>, SceneError> {
     let place = folder.source_materials();
     let path = place.join(SOURCE_MATERIALS);

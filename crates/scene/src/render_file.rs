@@ -1,6 +1,6 @@
-//! The files beside pictures: `render.json` (how a view's pictures were made), `scorer.json` (the scorer's own render of the
-//! true maps, with which predictions under light are compared) and `compare.json` (whether the tracer and the photo renderer
-//! show the same scenes).
+//! The files beside pictures: `render.json` (how a view's pictures were made), `scorer.json` (the scorer's own render
+//! of the true maps, with which predictions under light are compared) and `compare.json` (whether the tracer and the
+//! photo renderer show the same scenes).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -30,8 +30,8 @@ pub struct RenderFile {
     pub seeds: [String; 2],
     /// Number of scatterings after which a path is cut.
     pub max_bounces: u32,
-    /// The throughput that cut paths still carried, averaged over all paths. Multiplied by the radiance around, it is the
-    /// light that is missing. Null where the renderer does not report it.
+    /// The throughput that cut paths still carried, averaged over all paths. Multiplied by the radiance around, it is
+    /// the light that is missing. Null where the renderer does not report it.
     pub capped_throughput: Option<f64>,
     /// The denoiser that made `rgb` from the mean of the halves.
     pub denoiser: String,
@@ -47,8 +47,8 @@ pub struct RenderFile {
 pub struct RenderNoise {
     /// Mean of ((a - b) / 2)²: the expected squared error of the plain mean of both halves.
     pub mean_of_halves_mse: f64,
-    /// Mean of (rgb - a) (rgb - b): the squared error of the denoised picture, without the noise of the halves, so that it
-    /// may be slightly below 0.
+    /// Mean of (rgb - a) (rgb - b): the squared error of the denoised picture, without the noise of the halves, so that
+    /// it may be slightly below 0.
     pub denoised_mse: f64,
 }
 
@@ -78,7 +78,8 @@ pub struct ScorerFile {
     pub format: String,
     /// Rises whenever the pictures could change for the same inputs.
     pub version: u32,
-    /// SHA-256, hex, of names and hashes of the scene's files from which the pictures were made, as the manifest listed them.
+    /// SHA-256, hex, of names and hashes of the scene's files from which the pictures were made, as the manifest listed
+    /// them.
     pub inputs_sha256: String,
     /// Samples per pixel of each of the two halves whose mean the pictures are.
     pub samples_each_half: u32,
@@ -86,15 +87,15 @@ pub struct ScorerFile {
     pub seeds: [String; 2],
     /// The light groups in the order of `lights.json`; each view has a picture of each, `group_00.exr` first.
     pub lights: Vec<String>,
-    /// How noisy the pictures are, by view: the variance that noise causes in the sum of the groups, encoded, averaged over
-    /// valid pixels and channels.
+    /// How noisy the pictures are, by view: the variance that noise causes in the sum of the groups, encoded, averaged
+    /// over valid pixels and channels.
     pub variance: BTreeMap<ViewId, f64>,
     /// SHA-256, hex, of each picture by its path in `renders/scorer`.
     pub files: BTreeMap<String, String>,
 }
 
-/// SHA-256, hex, of names and hashes of all files of a scene from which light is rendered, as the manifest lists them, or, of
-/// a scene that was built since, as it was built.
+/// SHA-256, hex, of names and hashes of all files of a scene from which light is rendered, as the manifest lists them,
+/// or, of a scene that was built since, as it was built.
 pub fn light_inputs_sha256(root: &Path, scene: &SceneId) -> Result<String, SceneError> {
     let hashes = SceneHashes::open(root, scene)?;
     // The input picture is a copy of a render.
@@ -115,7 +116,8 @@ pub struct CompareFile {
     pub format: String,
     /// The program that compared and its version, as in `mateval 0.1.0`.
     pub tool: String,
-    /// SHA-256, hex, of the manifest of the dataset that was compared. After a change of the dataset the verdict is void.
+    /// SHA-256, hex, of the manifest of the dataset that was compared. After a change of the dataset the verdict is
+    /// void.
     pub manifest_sha256: String,
     /// The scenes that were compared.
     pub scenes: BTreeMap<SceneId, CompareCounts>,
@@ -143,8 +145,9 @@ impl CompareFile {
         json::read_format(&path, VERDICT_FORMAT).map(Some)
     }
 
-    /// Adds the scenes to the file of the dataset in `root`, and replaces those that it lists. Scenes that were compared by
-    /// another version, or before the dataset changed, are dropped. Several processes may compare scenes of one dataset.
+    /// Adds the scenes to the file of the dataset in `root`, and replaces those that it lists. Scenes that were
+    /// compared by another version, or before the dataset changed, are dropped. Several processes may compare scenes of
+    /// one dataset.
     pub fn add_beside(self, root: &Path) -> Result<(), SceneError> {
         let _lease = BuildFolder::of(root).lease_of_verdict()?;
         let mut file = self;

@@ -1,7 +1,7 @@
 //! What making a scene has cost. It is kept in `.build`, because the bytes of a dataset must not depend on a clock.
 //!
-//! Costs add up over all runs since the scene was built, so that a resumed step counts as a whole; a run that was killed
-//! or failed is not counted.
+//! Costs add up over all runs since the scene was built, so that a resumed step counts as a whole; a run that was
+//! killed or failed is not counted.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -39,8 +39,8 @@ pub struct StepCost {
     pub runs: usize,
     /// Elapsed time of all runs, in seconds.
     pub wall_seconds: f64,
-    /// Processor time of all runs, on all threads and in child processes such as Blender, in seconds; null where the system
-    /// does not state it, or where a run worked on several scenes at once.
+    /// Processor time of all runs, on all threads and in child processes such as Blender, in seconds; null where the
+    /// system does not state it, or where a run worked on several scenes at once.
     pub cpu_seconds: Option<f64>,
 }
 
@@ -76,8 +76,8 @@ pub fn forget(root: &Path, scene: &SceneId) -> Result<(), SceneError> {
     work_folder::remove(&BuildFolder::of(root).cost(scene))
 }
 
-/// Does the work and, if it succeeds, adds its cost to those recorded. The caller holds the scene's lease. A record that
-/// cannot be read fails before the work.
+/// Does the work and, if it succeeds, adds its cost to those recorded. The caller holds the scene's lease. A record
+/// that cannot be read fails before the work.
 pub fn timed<T, E: From<SceneError>>(
     root: &Path,
     scene: &SceneId,
@@ -129,8 +129,8 @@ const STAT: &str = "/proc/self/stat";
 /// The places of `utime`, `stime`, `cutime` and `cstime` behind the program's name.
 const TIMES: std::ops::Range<usize> = 11..15;
 
-/// The processor time used so far, of all threads and of child processes that have ended; none where the system does not
-/// state it.
+/// The processor time used so far, of all threads and of child processes that have ended; none where the system does
+/// not state it.
 pub fn processor_time() -> Option<Duration> {
     let ticks = ticks(&std::fs::read_to_string(STAT).ok()?)?;
     Some(Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second() as f64))

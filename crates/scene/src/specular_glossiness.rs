@@ -1,4 +1,5 @@
-//! Converts materials of the glTF extension `KHR_materials_pbrSpecularGlossiness` to base colour, roughness and metallic.
+//! Converts materials of the glTF extension `KHR_materials_pbrSpecularGlossiness` to base colour, roughness and
+//! metallic.
 //!
 //! The formulas are those of the extension's own example, "convert-between-workflows" (Khronos, glTF repository, 2017).
 
@@ -33,8 +34,8 @@ pub struct MetallicRoughness {
 }
 
 impl SpecularGlossiness {
-    /// The factors of a glTF's material. The extension's default of the specular colour is white, which leaves nothing of
-    /// the diffuse colour; where the file states no specular colour, it is that of a dielectric.
+    /// The factors of a glTF's material. The extension's default of the specular colour is white, which leaves nothing
+    /// of the diffuse colour; where the file states no specular colour, it is that of a dielectric.
     pub fn of(material: &PbrSpecularGlossiness<'_>, states_specular: bool) -> Self {
         let [red, green, blue, _] = material.diffuse_factor();
         let specular = if states_specular { material.specular_factor() } else { [DIELECTRIC; 3] };
@@ -72,7 +73,8 @@ fn metallic(diffuse: f32, specular: f32, rest: f32) -> f32 {
     ((root - b) / (2.0 * DIELECTRIC)).clamp(0.0, 1.0)
 }
 
-/// Textures that multiply the factors of a material: of the diffuse colour, of the specular colour, and of the glossiness.
+/// Textures that multiply the factors of a material: of the diffuse colour, of the specular colour, and of the
+/// glossiness.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SpecularTextures<'a> {
     /// Linear diffuse colour.
@@ -83,8 +85,8 @@ pub struct SpecularTextures<'a> {
     pub glossiness: Option<&'a Texture>,
 }
 
-/// The textures of a material as base colour (linear), and as roughness in green and metallic in blue, as glTF has them.
-/// Both have as many texels as the largest of the given textures.
+/// The textures of a material as base colour (linear), and as roughness in green and metallic in blue, as glTF has
+/// them. Both have as many texels as the largest of the given textures.
 pub fn textures(factors: SpecularGlossiness, from: SpecularTextures<'_>) -> Result<[Texture; 2], ImageError> {
     let all = [from.diffuse, from.specular, from.glossiness];
     let size = |side: fn(&Texture) -> usize| all.into_iter().flatten().map(side).max().unwrap_or(1);
@@ -119,7 +121,8 @@ mod tests {
         found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 2e-3)
     }
 
-    /// Both workflows describe the same light: diffuse = base (1 - 0.04) (1 - metallic), specular = mix(0.04, base, metallic).
+    /// Both workflows describe the same light: diffuse = base (1 - 0.04) (1 - metallic), specular = mix(0.04, base,
+    /// metallic).
     #[test]
     fn the_conversion_is_undone() {
         for (base_color, metallic) in [([0.8, 0.2, 0.1], 0.0), ([0.9, 0.7, 0.3], 1.0), ([0.5; 3], 0.0)] {

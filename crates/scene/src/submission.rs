@@ -1,5 +1,5 @@
-//! A submission: `submission.json` and `scenes/<scene>/<instance>/{base_color,roughness,metallic}.{png,exr}`, and the transfer
-//! functions of the numbers that other projects' networks store in pictures.
+//! A submission: `submission.json` and `scenes/<scene>/<instance>/{base_color,roughness,metallic}.{png,exr}`, and the
+//! transfer functions of the numbers that other projects' networks store in pictures.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -77,8 +77,8 @@ macro_rules! word_enum {
     };
 }
 
-/// Serde and a schema by way of `Display` and `FromStr`. The pattern holds the shape alone: `dataset_spec/FORMAT.md` lists the
-/// words.
+/// Serde and a schema by way of `Display` and `FromStr`. The pattern holds the shape alone: `dataset_spec/FORMAT.md`
+/// lists the words.
 #[macro_export]
 macro_rules! by_text {
     ($name:ident, $error:ty, $pattern:literal) => {

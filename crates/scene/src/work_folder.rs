@@ -1,8 +1,9 @@
-//! Folders on disk: whether an output may be written, folders that appear whole or not at all, and the bound on the size of a
-//! cache, a folder whose entries are files, or folders of files.
+//! Folders on disk: whether an output may be written, folders that appear whole or not at all, and the bound on the
+//! size of a cache, a folder whose entries are files, or folders of files.
 //!
-//! Whoever reads an entry of a cache marks it as used now. Whoever adds one removes those that were not used for longest until
-//! the rest is small enough, but none that was used within the last hour, which another process may be reading.
+//! Whoever reads an entry of a cache marks it as used now. Whoever adds one removes those that were not used for
+//! longest until the rest is small enough, but none that was used within the last hour, which another process may be
+//! reading.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -137,15 +138,15 @@ fn beside(place: &Path) -> Result<PathBuf, SceneError> {
 /// Entries that were used within this time stay.
 const SPARED: Duration = Duration::from_secs(3600);
 
-/// Marks an entry as used now by one of its files, or the entry itself if it is a file. Without the permission to do so it
-/// counts as older than it is.
+/// Marks an entry as used now by one of its files, or the entry itself if it is a file. Without the permission to do so
+/// it counts as older than it is.
 pub fn mark_used(file: &Path) {
     // Reading the entry matters more than keeping it.
     let _ = std::fs::File::options().append(true).open(file).and_then(|file| file.set_modified(SystemTime::now()));
 }
 
-/// Removes what was not used for longest until the entries of `cache` take at most `most_bytes`. An entry was last used when
-/// the newest of its files was.
+/// Removes what was not used for longest until the entries of `cache` take at most `most_bytes`. An entry was last used
+/// when the newest of its files was.
 pub fn keep_below(cache: &Path, most_bytes: u64) -> io::Result<()> {
     let mut entries = Vec::new();
     for entry in std::fs::read_dir(cache)? {

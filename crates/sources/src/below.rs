@@ -1,4 +1,5 @@
-//! Makes paths relative to the source's folder, since a dataset must not record the folders of the machine that made it.
+//! Makes paths relative to the source's folder, since a dataset must not record the folders of the machine that made
+//! it.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -11,8 +12,8 @@ pub enum BelowError {
     Elsewhere { path: PathBuf, source_folder: PathBuf },
 }
 
-/// The path relative to `source`. Fails where it leads elsewhere. A relative path within the folder is returned unchanged
-/// and may pass through links.
+/// The path relative to `source`. Fails where it leads elsewhere. A relative path within the folder is returned
+/// unchanged and may pass through links.
 pub fn relative_below(path: &Path, source: &Path) -> Result<PathBuf, BelowError> {
     if !path.is_absolute() {
         let leads_out = || BelowError::LeadsOut { path: path.to_owned() };
@@ -46,7 +47,8 @@ fn stays_inside(path: &Path) -> bool {
     depth.is_some()
 }
 
-/// The deepest folder that contains all of these, with links resolved; none where that is the root or a path is missing.
+/// The deepest folder that contains all of these, with links resolved; none where that is the root or a path is
+/// missing.
 pub fn common_folder<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<PathBuf> {
     let mut common: Option<PathBuf> = None;
     for path in paths {

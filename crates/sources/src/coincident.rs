@@ -1,10 +1,10 @@
-//! Separates sheets that coincide: in houses those of architecture, and of furniture that lies in architecture; in other
-//! scenes, which do not say what is architecture, all sheets that lie in each other.
+//! Separates sheets that coincide: in houses those of architecture, and of furniture that lies in architecture; in
+//! other scenes, which do not say what is architecture, all sheets that lie in each other.
 //!
-//! Houses place a feature wall, a door's pocket or a second ceiling exactly in the plane of the wall or ceiling behind it,
-//! and mats, lamps and feet in that of the floor. A ray meets either of two such sheets, and each shadows the other. The
-//! result depends on the renderer (Blender loses up to half of the light that leaves them), so it cannot serve as ground
-//! truth.
+//! Houses place a feature wall, a door's pocket or a second ceiling exactly in the plane of the wall or ceiling behind
+//! it, and mats, lamps and feet in that of the floor. A ray meets either of two such sheets, and each shadows the
+//! other. The result depends on the renderer (Blender loses up to half of the light that leaves them), so it cannot
+//! serve as ground truth.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,13 +19,15 @@ use crate::surface_mesh::{connected_parts, find};
 
 /// Sheets of architecture no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
 const COINCIDENT_M: f64 = 1e-5;
-/// Furniture no further from architecture is meant to touch it: models stand on their origin to within a millimetre or so.
+/// Furniture no further from architecture is meant to touch it: models stand on their origin to within a millimetre or
+/// so.
 const TOUCHES_M: f64 = 1e-3;
 /// The distance by which a sheet is moved: a hundred steps of a coordinate, a fiftieth of a pixel.
 const LAYER_M: f64 = 1e-4;
 /// No sheet is moved further than this many times [`LAYER_M`].
 const MOST_LAYERS: usize = 8;
-/// Faces whose normals have a smaller cosine cross each other. The sides of a thin mat, for one, do not lie in the floor.
+/// Faces whose normals have a smaller cosine cross each other. The sides of a thin mat, for one, do not lie in the
+/// floor.
 const PARALLEL: f64 = 0.99;
 /// A piece whose middle is nearer to a plane, in metres, lies in it and stands on neither side.
 const LIES_M: f64 = 0.01;
@@ -33,11 +35,11 @@ const LIES_M: f64 = 0.01;
 /// By surface and triangle, how far the triangle moves.
 type Shifts = BTreeMap<usize, BTreeMap<usize, DVec3>>;
 
-/// Moves every sheet of architecture that coincides with a larger one slightly to the side that it faces, and every sheet of
-/// furniture that touches architecture slightly in front of it.
+/// Moves every sheet of architecture that coincides with a larger one slightly to the side that it faces, and every
+/// sheet of furniture that touches architecture slightly in front of it.
 ///
-/// Of two sheets of architecture, the smaller is moved, since a decoration is smaller than its wall; of two of equal area,
-/// the later. Without architecture, all sheets are compared in this way.
+/// Of two sheets of architecture, the smaller is moved, since a decoration is smaller than its wall; of two of equal
+/// area, the later. Without architecture, all sheets are compared in this way.
 ///
 /// A sheet that moves leaves its neighbours, so the parts of a surface that has none yet are found before.
 pub(crate) fn separate(surfaces: &mut [Surface], origins: &mut [InstanceOrigin], log: &mut Log) {
@@ -155,8 +157,8 @@ fn raise(
     is_whole
 }
 
-/// The shift that takes each face of furniture in front of all architecture that it touches, by its index; none where there
-/// are too many pairs.
+/// The shift that takes each face of furniture in front of all architecture that it touches, by its index; none where
+/// there are too many pairs.
 fn wanted_shifts(
     surfaces: &[Surface],
     architecture: &[Face],
@@ -292,8 +294,8 @@ fn for_each_near(all: &[Face], among: &[Face], distance: f64, mut found: impl Fn
     true
 }
 
-/// Whether two triangles in one plane overlap by more than [`TOUCHING_M`], by the separating axis theorem: no line along an
-/// edge of either separates them.
+/// Whether two triangles in one plane overlap by more than [`TOUCHING_M`], by the separating axis theorem: no line
+/// along an edge of either separates them.
 fn overlap(one: &Face, other: &Face) -> bool {
     let separates = |edge: DVec3| {
         let axis = edge.cross(one.normal).normalize_or_zero();
@@ -326,8 +328,8 @@ struct Sheets {
 impl Sheets {
     /// The sheets of these faces, of which the `pairs` lie in each other.
     ///
-    /// The segments of a moulding may overlap each other, and small meshes share a part. Where faces of one sheet overlap, each
-    /// of its connected pieces is a sheet, and where that is not enough, each of the piece's triangles.
+    /// The segments of a moulding may overlap each other, and small meshes share a part. Where faces of one sheet
+    /// overlap, each of its connected pieces is a sheet, and where that is not enough, each of the piece's triangles.
     fn new(faces: &[Face], pairs: &[[usize; 2]]) -> Self {
         let mut of_face = numbered(faces.iter().map(plane_key));
         for finer in [connected_pieces as Split, triangles_apart] {
@@ -358,8 +360,8 @@ impl Sheets {
         Self { all, of_face }
     }
 
-    /// A layer for each sheet, at most `most`. From the largest sheet to the smallest, each takes the lowest layer that no
-    /// sheet it overlaps has taken.
+    /// A layer for each sheet, at most `most`. From the largest sheet to the smallest, each takes the lowest layer that
+    /// no sheet it overlaps has taken.
     fn layers(&self, most: usize) -> Vec<usize> {
         let mut by_area: Vec<usize> =
             (0..self.all.len()).filter(|&sheet| !self.all[sheet].overlaps.is_empty()).collect();
@@ -574,8 +576,8 @@ mod tests {
         mesh
     }
 
-    /// A flat piece in a floor, a little below or just above it, whichever way it faces, comes to lie on it; a piece on top of
-    /// another lies on both.
+    /// A flat piece in a floor, a little below or just above it, whichever way it faces, comes to lie on it; a piece on
+    /// top of another lies on both.
     #[test]
     fn furniture_lies_on_the_floor() {
         let floor = || (square(0.0, 5.0, true), architecture());

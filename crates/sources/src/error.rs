@@ -1,4 +1,5 @@
-//! Opens the main file of a source. A fault here means that a source could not be read at all; lesser faults are findings.
+//! Opens the main file of a source. A fault here means that a source could not be read at all; lesser faults are
+//! findings.
 
 use std::path::{Path, PathBuf};
 
@@ -50,8 +51,8 @@ pub enum InvalidSource {
     Gltf(GltfSceneError),
 }
 
-/// Reads the file at `path`, which may have at most `most` bytes. Returns its folder, its name and its bytes. Other files
-/// of the folder may have at most `file_bytes`.
+/// Reads the file at `path`, which may have at most `most` bytes. Returns its folder, its name and its bytes. Other
+/// files of the folder may have at most `file_bytes`.
 pub fn open(path: &Path, most: u64, file_bytes: u64) -> Result<(SourceFolder, String, Vec<u8>), SourceError> {
     let io = |source| SourceError::Io { path: path.to_owned(), source };
     let invalid = |reason| SourceError::invalid(path, reason);

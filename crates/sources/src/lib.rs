@@ -170,7 +170,8 @@ mod tests {
             let findings = read_json(&input).findings;
             assert!(findings.iter().any(|finding| finding.code == code), "{value}: {findings:?}");
         }
-        // The default of the format for a base colour is marked, since the reader does not know its share of the picture.
+        // The default of the format for a base colour is marked, since the reader does not know its share of the
+        // picture.
         let scene = read_json(&with("/asset/generator", json!("x")));
         assert!(!scene.origins[0].stated.base_color && scene.origins[0].stated.roughness);
     }

@@ -1,7 +1,7 @@
 //! Faces without texture coordinates: absent, or NaN at one of their corners.
 //!
-//! A texture has no place for such a face. Mitsuba uses barycentric coordinates ([`barycentric`]); for all other sources
-//! the mean of the texture stands for it ([`resolve`]), so that no face takes the colour of an arbitrary texel.
+//! A texture has no place for such a face. Mitsuba uses barycentric coordinates ([`barycentric`]); for all other
+//! sources the mean of the texture stands for it ([`resolve`]), so that no face takes the colour of an arbitrary texel.
 
 use std::collections::BTreeMap;
 
@@ -22,8 +22,8 @@ fn triangles_without(mesh: &TriangleMesh) -> Vec<bool> {
     mesh.triangles.iter().map(|triangle| triangle.iter().any(|vertex| !uvs[*vertex as usize].is_finite())).collect()
 }
 
-/// The mesh with barycentric texture coordinates on faces without any, as Mitsuba 3.9.1 looks them up: (0, 0), (1, 0) and
-/// (0, 1) at the corners, with v downwards. Returns the number of those faces.
+/// The mesh with barycentric texture coordinates on faces without any, as Mitsuba 3.9.1 looks them up: (0, 0), (1, 0)
+/// and (0, 1) at the corners, with v downwards. Returns the number of those faces.
 pub(crate) fn barycentric(mesh: &mut TriangleMesh) -> usize {
     let without = triangles_without(mesh);
     let count = without.iter().filter(|is_without| **is_without).count();
@@ -49,9 +49,9 @@ pub(crate) fn barycentric(mesh: &mut TriangleMesh) -> usize {
     count
 }
 
-/// Gives the mean of its textures to every face that has textures and no texture coordinates. Where only some faces of a
-/// surface have none, they become a surface of their own at the end of the list; the indices of the surfaces that were
-/// split are returned in their order. Afterwards all texture coordinates are finite.
+/// Gives the mean of its textures to every face that has textures and no texture coordinates. Where only some faces of
+/// a surface have none, they become a surface of their own at the end of the list; the indices of the surfaces that
+/// were split are returned in their order. Afterwards all texture coordinates are finite.
 pub(crate) fn resolve(scene: &mut ReferenceScene, origins: &mut Vec<InstanceOrigin>, log: &mut Log) -> Vec<usize> {
     let (mut means, mut split) = (Means::default(), Vec::new());
     for at in 0..scene.surfaces.len() {

@@ -1,5 +1,5 @@
-//! Shapes that files state by a formula: Mitsuba's as triangles in object space, whose normals point to the front and whose
-//! v grows upwards (one minus Mitsuba's), and the disc of a sun in a latitude-longitude map.
+//! Shapes that files state by a formula: Mitsuba's as triangles in object space, whose normals point to the front and
+//! whose v grows upwards (one minus Mitsuba's), and the disc of a sun in a latitude-longitude map.
 
 use std::f64::consts::PI;
 

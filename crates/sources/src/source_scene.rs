@@ -1,5 +1,5 @@
-//! The scene that every reader makes, and what they all do while they make it: collect findings, name things apart, move
-//! far scenes near to the origin, and count the JSON before it is parsed.
+//! The scene that every reader makes, and what they all do while they make it: collect findings, name things apart,
+//! move far scenes near to the origin, and count the JSON before it is parsed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -35,8 +35,8 @@ pub struct InstanceOrigin {
     pub class_of_part: Option<Vec<Option<MaterialClass>>>,
     /// Which parameters of its material the source states.
     pub stated: StatedParameters,
-    /// The mesh before it was moved to its place, at its final size, where the source moves copies of a model: equal for all
-    /// copies.
+    /// The mesh before it was moved to its place, at its final size, where the source moves copies of a model: equal
+    /// for all copies.
     pub shape: Option<Arc<TriangleMesh>>,
 }
 
@@ -124,8 +124,8 @@ pub(crate) fn picture_fault(code: &'static str, error: &ImageError) -> FileFault
     FileFault { code, message }
 }
 
-/// A scene whose camera stands farther than this from the origin, in metres, is moved near to it before anything becomes
-/// f32. Scenes in map coordinates are.
+/// A scene whose camera stands farther than this from the origin, in metres, is moved near to it before anything
+/// becomes f32. Scenes in map coordinates are.
 const NEAR_M: f64 = 1000.0;
 
 /// What is subtracted from the positions of a scene with its camera here: whole metres, or nothing near the origin.
@@ -238,8 +238,8 @@ impl UniqueNames {
     }
 }
 
-/// The number of values in a JSON text. It is counted before the text is parsed, since two bytes of text can take a hundred
-/// bytes of memory.
+/// The number of values in a JSON text. It is counted before the text is parsed, since two bytes of text can take a
+/// hundred bytes of memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct JsonSize {
     /// Commas and colons outside strings.

@@ -1,5 +1,5 @@
-//! Meshes of surfaces: brings them to world space, repairs positions, normals and front sides, and splits them into parts,
-//! which are connected components, or those of each group.
+//! Meshes of surfaces: brings them to world space, repairs positions, normals and front sides, and splits them into
+//! parts, which are connected components, or those of each group.
 
 use std::collections::HashMap;
 
@@ -128,8 +128,8 @@ fn repair_normals(mesh: &mut TriangleMesh) -> usize {
 }
 
 /// Vertex normals of a smooth surface: the mean of the adjacent faces' normals, weighted by their angles at the vertex
-/// (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba computes them for an OBJ
-/// without normals.
+/// (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba computes them for an
+/// OBJ without normals.
 pub fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for (index, triangle) in mesh.triangles.iter().enumerate() {

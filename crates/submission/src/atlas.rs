@@ -1,5 +1,5 @@
-//! The atlas of an instance, as triangles over texels: which part of each texel a triangle covers, and which texels lookups
-//! through the triangles can reach.
+//! The atlas of an instance, as triangles over texels: which part of each texel a triangle covers, and which texels
+//! lookups through the triangles can reach.
 
 use std::sync::OnceLock;
 
@@ -8,15 +8,16 @@ use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::{SceneError, TriangleMesh, reference};
 
-/// By how much the square of texels that a place reads is larger on each side, in texels, for coordinates of up to 1; in proportion beyond. Lookups
-/// round to single precision: in the largest map they are off by up to a thousandth of a texel.
+/// By how much the square of texels that a place reads is larger on each side, in texels, for coordinates of up to 1;
+/// in proportion beyond. Lookups round to single precision: in the largest map they are off by up to a thousandth of a
+/// texel.
 pub const REACH_MARGIN: f64 = 1.0 / 64.0;
 
 /// Where a coordinate is at least this, every texel counts as reached: lookups read coordinates beyond 1e9 as 0.
 const LARGE_UV: f32 = 1e8;
 
-/// The atlas meshes of one scene, one for each instance in the order of `scene.json`. Their uv say which texels of a map
-/// are looked up. Only a map with bad texels needs them, so they are read when the first one asks.
+/// The atlas meshes of one scene, one for each instance in the order of `scene.json`. Their uv say which texels of a
+/// map are looked up. Only a map with bad texels needs them, so they are read when the first one asks.
 pub struct AtlasMeshes<'a> {
     source: Source<'a>,
     read: OnceLock<Vec<TriangleMesh>>,
@@ -73,8 +74,8 @@ pub(crate) struct Part {
     pub(crate) centroid: DVec2,
 }
 
-/// The triangles of an atlas by the rows of texels that they reach. It yields the exact area of each texel that a triangle
-/// covers, by clipping the triangle to the texel's square.
+/// The triangles of an atlas by the rows of texels that they reach. It yields the exact area of each texel that a
+/// triangle covers, by clipping the triangle to the texel's square.
 ///
 /// Counting the texels whose centre lies inside would be wrong: packers put the edges of charts on texel centres, so
 /// that a chart of 2 by 5 texels holds 3 by 6 of them.
@@ -166,8 +167,8 @@ fn spanned(along: impl IntoIterator<Item = f64>, size: usize) -> std::ops::Range
 }
 
 /// The texels of a map of this size that lookups through the atlas can reach, or a few more: those in the bilinear
-/// footprint of a place that a triangle covers. All others may hold anything. All of them where the atlas has no uv or a
-/// uv that is not finite.
+/// footprint of a place that a triangle covers. All others may hold anything. All of them where the atlas has no uv or
+/// a uv that is not finite.
 ///
 /// A place reads the texels whose centres are less than one texel away in both directions. A texel is therefore reached
 /// if the square of two texels around its centre meets a triangle, however thin that is. Places beside the picture read
@@ -189,8 +190,8 @@ pub(crate) fn reached(atlas: &TriangleMesh, width: usize, height: usize) -> Texe
     reach
 }
 
-/// Adds the texels whose centre is at most `far` from the triangle in both directions. Corners are in texels from the top
-/// left.
+/// Adds the texels whose centre is at most `far` from the triangle in both directions. Corners are in texels from the
+/// top left.
 fn add_near(reach: &mut TexelSet, corners: [DVec2; 3], far: f64) {
     let (width, height) = (reach.width(), reach.height());
     for y in near(corners.iter().map(|corner| corner.y), far, height) {

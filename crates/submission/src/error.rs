@@ -57,8 +57,8 @@ pub enum SceneFault {
     PictureSize { expected: [usize; 2], found: [usize; 2] },
 }
 
-/// The fault of one file. `eval lint` reports it as a finding. Scoring replaces the map by its default, or, if only a few
-/// texels are bad, those.
+/// The fault of one file. `eval lint` reports it as a finding. Scoring replaces the map by its default, or, if only a
+/// few texels are bad, those.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileFault {
     /// A stable word, as in `not_square`.

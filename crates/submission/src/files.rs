@@ -1,7 +1,8 @@
 //! The files of a submission: where they lie, their bytes, and the hashes of these same bytes.
 //!
-//! Scoring, verification and `eval lint` read a submission's files here and nowhere else, each once. If a file is replaced
-//! during a run, the result therefore has the hash of the bytes that were scored, never that of the other version.
+//! Scoring, verification and `eval lint` read a submission's files here and nowhere else, each once. If a file is
+//! replaced during a run, the result therefore has the hash of the bytes that were scored, never that of the other
+//! version.
 //!
 //! The files are untrusted input: nothing outside the submission's folder is read, and no more than a given size.
 

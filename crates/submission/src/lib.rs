@@ -3,8 +3,8 @@
 //! In: a folder or an archive, and the dataset that it answers. Out: maps ready to be rendered and the hash that
 //! identifies the submission ([`prediction`]), and findings about everything that is wrong ([`lint`]).
 //!
-//! Between: [`archive`] unpacks within limits, [`files`] reads a file once and hashes the same bytes, [`map_file`] decodes
-//! one map and replaces what it holds besides finite numbers in range ([`atlas`] finds the texels that count),
+//! Between: [`archive`] unpacks within limits, [`files`] reads a file once and hashes the same bytes, [`map_file`]
+//! decodes one map and replaces what it holds besides finite numbers in range ([`atlas`] finds the texels that count),
 //! [`texel_map`] finds where an atlas's texels lie on the surface and which of them the input view shows.
 
 pub mod archive;

@@ -1,5 +1,5 @@
-//! Decodes one map of a submission: its header and texels, or the fault that makes it unusable. Texels that hold no usable
-//! number are replaced, unless there are too many.
+//! Decodes one map of a submission: its header and texels, or the fault that makes it unusable. Texels that hold no
+//! usable number are replaced, unless there are too many.
 //!
 //! Scoring and `eval lint` both decode maps here. The file is untrusted input: sizes are checked before memory is
 //! taken.
@@ -109,8 +109,8 @@ fn check_header(path: &Path, bytes: &[u8], map: Map) -> Result<MapHeader, FileFa
     match &header {
         MapHeader::Png(png) => {
             check_size(png.width as usize, png.height as usize)?;
-            // Without its closing chunk a PNG was truncated, even if all texels can be decoded: nothing else proves that
-            // the file is complete.
+            // Without its closing chunk a PNG was truncated, even if all texels can be decoded: nothing else proves
+            // that the file is complete.
             if !png.ended {
                 let message = "truncated: it has no closing chunk (IEND)";
                 return Err(FileFault::new("truncated_picture", message, "write or copy it again, whole"));
@@ -224,7 +224,8 @@ fn texels(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<T
 /// them.
 type Repaired = Result<(Texture, Option<FileFault>), FileFault>;
 
-/// Replaces the bad texels of a map: those that hold no finite number in range. `atlas` is asked for only if there are any; fails only where it does.
+/// Replaces the bad texels of a map: those that hold no finite number in range. `atlas` is asked for only if there are
+/// any; fails only where it does.
 fn repaired<'a>(
     texture: Texture,
     map: Map,
@@ -287,8 +288,8 @@ impl Numbers<'_> {
 }
 
 /// Replaces every bad texel. A texel is bad as a whole if any of its numbers is. Bad texels that no lookup reaches, as
-/// gutters often are, take the map's default, those that are reached the mean of their sound neighbours. Returns the finding about those in `reach`, none if there are none; fails where there are
-/// too many.
+/// gutters often are, take the map's default, those that are reached the mean of their sound neighbours. Returns the
+/// finding about those in `reach`, none if there are none; fails where there are too many.
 fn repair(numbers: &mut Numbers<'_>, map: Map, reach: TexelSet) -> Result<Option<FileFault>, FileFault> {
     let range = range_of(map);
     let (width, reached) = (reach.width(), reach.count());
@@ -316,8 +317,8 @@ fn repair(numbers: &mut Numbers<'_>, map: Map, reach: TexelSet) -> Result<Option
 /// Gives bad texels the mean of their sound neighbours, in rounds: those that have any take it, all at once, and are
 /// sound from the next round on. Texels that no round reaches keep what they hold.
 ///
-/// Each texel is visited once as a member of a round and once for each neighbour, so that the work is linear whatever the
-/// shape of the bad area.
+/// Each texel is visited once as a member of a round and once for each neighbour, so that the work is linear whatever
+/// the shape of the bad area.
 fn fill_from_neighbours(numbers: &mut Numbers<'_>, mut bad: TexelSet, mut sound: TexelSet) {
     let mut round: Vec<usize> = bad.iter().filter(|at| sound.neighbours(*at).any(|other| sound.holds(other))).collect();
     while !round.is_empty() {
@@ -515,7 +516,8 @@ mod tests {
         }
     }
 
-    /// The ring of a block takes means of sound texels alone, the middle the mean of the ring, all of one round at once.
+    /// The ring of a block takes means of sound texels alone, the middle the mean of the ring, all of one round at
+    /// once.
     #[test]
     fn blocks_are_filled_from_outside_in_rounds() {
         let is_bad = |at: usize| (29..32).contains(&(at % SIDE)) && (29..32).contains(&(at / SIDE));

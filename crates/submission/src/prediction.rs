@@ -1,4 +1,5 @@
-//! The maps that a submission holds for one scene, ready to be rendered; and the hash of all of them, without decoding any.
+//! The maps that a submission holds for one scene, ready to be rendered; and the hash of all of them, without decoding
+//! any.
 //!
 //! A missing or unusable map is replaced by a default, which is scored and reported as a finding. A map that the format
 //! makes optional may be missing without a finding.

@@ -182,8 +182,8 @@ impl Observer<'_> {
         texels
     }
 
-    /// A texel that is not observed yet, and how the camera could see it, if its picture holds the place. None for a texel
-    /// that is cut out.
+    /// A texel that is not observed yet, and how the camera could see it, if its picture holds the place. None for a
+    /// texel that is cut out.
     fn texel(&self, size: usize, x: usize, cell: &Cell) -> Option<(Texel, Option<Sight>)> {
         // Rounding may put a place on an edge slightly outside.
         let weights = self.coverage.barycentrics(cell.triangle, cell.place).max(DVec3::ZERO);

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::shared_data;
 use glam::{Vec2, Vec3};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap};
@@ -15,6 +14,8 @@ use mateval_scene::reference::{
 };
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use serde_json::Value;
+
+use crate::shared_data;
 
 /// The folder of `bench/<name>`; none where the shared data are missing.
 pub fn folder(name: &str) -> Option<PathBuf> {

@@ -1,9 +1,9 @@
 //! Code that the tests and benches of several crates share. It is only a dev-dependency: no released crate uses it.
 //!
 //! [`scenes`] builds small scenes, [`bench_scene`] reads larger ones, and [`statistics`] compares their noisy renders;
-//! [`sample_dataset`] is the built-in sample as a dataset, with submissions for it, and [`faulty_house`] its house with a
-//! third room and faults; [`packed`] writes archives byte by byte. This file finds inputs that are not in the repository
-//! and makes folders that tests share.
+//! [`sample_dataset`] is the built-in sample as a dataset, with submissions for it, and [`faulty_house`] its house with
+//! a third room and faults; [`packed`] writes archives byte by byte. This file finds inputs that are not in the
+//! repository and makes folders that tests share.
 //!
 //! If one of these inputs is missing, the test that needs it is skipped, which is printed to stderr. With
 //! `MATEVAL_REQUIRE_DATA=1`, which CI sets, the test fails instead.

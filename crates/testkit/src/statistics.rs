@@ -1,5 +1,5 @@
-//! Noisy pictures: statistics that compare them, and pictures whose expectation is known, for tests of metrics that remove
-//! noise.
+//! Noisy pictures: statistics that compare them, and pictures whose expectation is known, for tests of metrics that
+//! remove noise.
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;

@@ -51,8 +51,8 @@ pub struct PixelMean<const N: usize> {
 }
 
 impl<const N: usize> PixelMean<N> {
-    /// The mean of the values that `look` gives for the sub-pixel of an index: of the coarse ones, or of all if the coarse
-    /// ones differ or some show nothing.
+    /// The mean of the values that `look` gives for the sub-pixel of an index: of the coarse ones, or of all if the
+    /// coarse ones differ or some show nothing.
     pub fn of(mut look: impl FnMut(usize) -> Option<[f32; N]>) -> Self {
         let (mut sum, mut count) = ([0.0_f64; N], 0_usize);
         let (mut low, mut high) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
@@ -85,8 +85,8 @@ pub fn appearance(world: &World, surface: SurfaceIndex, triangle: usize, barycen
     world.scene().materials[shown.material.0].appearance(world.textures(), uv)
 }
 
-/// The values of a pixel by which the truth decides how many of its places are looked at: base colour, its diffuse part,
-/// roughness and metallic.
+/// The values of a pixel by which the truth decides how many of its places are looked at: base colour, its diffuse
+/// part, roughness and metallic.
 pub fn flatness_values(seen: &Appearance) -> [f32; 8] {
     let [r, g, b] = seen.base_color;
     let rest = 1.0 - seen.metallic;
@@ -224,8 +224,8 @@ mod tests {
         assert_eq!((hit.surface, hit.depth.round()), (SurfaceIndex(1), 4.0));
     }
 
-    /// Opacities from 0.04 to 0.97 over the sheet: whatever the wall behind it, only what is neither clear nor opaque is a
-    /// veil.
+    /// Opacities from 0.04 to 0.97 over the sheet: whatever the wall behind it, only what is neither clear nor opaque
+    /// is a veil.
     #[test]
     fn fractional_opacity_is_a_veil() {
         let mut scene = world().scene().clone();

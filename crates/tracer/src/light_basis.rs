@@ -179,8 +179,8 @@ mod tests {
         assert_eq!(lengths(&LightGroups::together(0)), [0; 0]);
     }
 
-    /// 5 views of 100 x 50 pixels in 2 halves take 600,000 bytes per group: 2.4 MB hold four groups, one byte less holds
-    /// three.
+    /// 5 views of 100 x 50 pixels in 2 halves take 600,000 bytes per group: 2.4 MB hold four groups, one byte less
+    /// holds three.
     #[test]
     fn the_bound_merges_lights_and_says_so() {
         let within = |bytes| LightGroups::within(bytes, 10, &cameras(), 2);

@@ -1,10 +1,10 @@
 //! Takes the noise out of a render without blurring its textures.
 //!
-//! Light is smooth over surfaces, divided by the base colour of what it falls on where it follows that. It is filtered with the edge-avoiding
-//! a-trous wavelets of Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering"
-//! (2010), whose weights follow the noise as in Schied et al., "Spatiotemporal Variance-Guided Filtering" (2017): pixels are
-//! averaged where they belong to one instance, face the same way, and differ by no more than noise explains. As samples
-//! grow, the noise and with it the filter's effect vanish.
+//! Light is smooth over surfaces, divided by the base colour of what it falls on where it follows that. It is filtered
+//! with the edge-avoiding a-trous wavelets of Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast Global
+//! Illumination Filtering" (2010), whose weights follow the noise as in Schied et al., "Spatiotemporal Variance-Guided
+//! Filtering" (2017): pixels are averaged where they belong to one instance, face the same way, and differ by no more
+//! than noise explains. As samples grow, the noise and with it the filter's effect vanish.
 
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Normal, Picture};
 use rayon::prelude::*;
@@ -21,8 +21,8 @@ pub const DEVIATIONS: f32 = 4.0;
 /// The least cosine between the normals of pixels that are averaged.
 pub const LEAST_COSINE: f32 = 0.9;
 
-/// The weights of a pixel along a row or column, by its distance in steps: of a pass those up to 1, of the mean of variances
-/// all.
+/// The weights of a pixel along a row or column, by its distance in steps: of a pass those up to 1, of the mean of
+/// variances all.
 pub const KERNEL: [f32; 4] = [0.5, 0.25, 0.125, 0.0625];
 
 /// The least base colour that light is divided by.
@@ -48,8 +48,8 @@ struct Light {
     variance: f32,
 }
 
-/// The mean of two independent halves, linear, with its noise filtered. Values may be negative. Pixels that are not valid
-/// are those of the mean. The pictures are as large as those of `surfaces`.
+/// The mean of two independent halves, linear, with its noise filtered. Values may be negative. Pixels that are not
+/// valid are those of the mean. The pictures are as large as those of `surfaces`.
 pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) -> Picture<LinearRgb> {
     let (width, height) = (surfaces.valid.width(), surfaces.valid.height());
     let divisor = |k: usize| match surfaces.base_color {
@@ -64,8 +64,8 @@ pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) 
         Light { value, variance: noise * noise }
     };
     let mut pixels: Vec<Light> = (0..width * height).into_par_iter().map(divided).collect();
-    // One pixel's difference says little of its noise: take the mean over its neighbours. What stands out of all of them in
-    // one half alone is noise too.
+    // One pixel's difference says little of its noise: take the mean over its neighbours. What stands out of all of
+    // them in one half alone is noise too.
     pixels = filter(surfaces, |x, y| {
         let mut found = pixels[y * width + x];
         found.variance = found.variance.max(mean_variance(surfaces, &pixels, x, y));

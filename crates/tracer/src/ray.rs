@@ -159,8 +159,8 @@ impl SurfaceHit {
 /// 2^-24, half the spacing of f32 at 1.
 pub(crate) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
 
-/// The data of a triangle that shading reads, its corners and what is constant over it, in one record of 128 bytes: a hit
-/// touches two cache lines instead of twelve.
+/// The data of a triangle that shading reads, its corners and what is constant over it, in one record of 128 bytes: a
+/// hit touches two cache lines instead of twelve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct TriangleRecord {

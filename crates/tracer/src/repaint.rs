@@ -2,8 +2,8 @@
 //!
 //! Geometry, opacities, lights and surfaces without an atlas (glass) stay as they are in the world. The decisions along
 //! a path depend on roughness and metallic but never on base colour, so predictions that differ in base colour alone
-//! share their paths. Predictions of two pairs of roughness and metallic share paths too, at the price of some noise: the
-//! directions come from both ([`Repaint::with_second`]).
+//! share their paths. Predictions of two pairs of roughness and metallic share paths too, at the price of some noise:
+//! the directions come from both ([`Repaint::with_second`]).
 
 use std::array::from_fn;
 use std::ops::Range;

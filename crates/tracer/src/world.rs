@@ -112,10 +112,10 @@ impl World {
         Ok(Self { emitters, ..self.clone() })
     }
 
-    /// The same world, whose light samples are divided among the light groups' surfaces in proportion to `shares`, one for
-    /// each group, on average over what `camera` sees. Lamps that are nearer to a point are still sampled more often there.
-    /// The expectation of every picture is unchanged; groups with larger shares have less noise. Emitters at infinity keep their
-    /// share of the samples. The world has no stage lights.
+    /// The same world, whose light samples are divided among the light groups' surfaces in proportion to `shares`, one
+    /// for each group, on average over what `camera` sees. Lamps that are nearer to a point are still sampled more
+    /// often there. The expectation of every picture is unchanged; groups with larger shares have less noise. Emitters
+    /// at infinity keep their share of the samples. The world has no stage lights.
     pub fn with_group_shares(&self, camera: &Camera, shares: &[f64]) -> Self {
         let Intrinsics { width, height, .. } = camera.intrinsics;
         let probe = |at: u32, pixels: u32| f64::from(pixels) * (f64::from(at) + 0.5) / f64::from(PROBES);

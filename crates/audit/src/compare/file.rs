@@ -1,5 +1,5 @@
-//! `compare.json`: how far two renderers' pictures of a dataset agree; the kinds of material by how far two renderers may
-//! differ on them; and the bounds, with the reason of each.
+//! `compare.json`: how far two renderers' pictures of a dataset agree; the kinds of material by how far two renderers
+//! may differ on them; and the bounds, with the reason of each.
 
 use mateval_scene::material::MaterialModel;
 use mateval_scene::reference::ReferenceScene;
@@ -50,8 +50,8 @@ pub struct SceneComparison {
     pub scene: SceneId,
     /// The kinds of material that its surfaces have, sorted.
     pub kinds: Vec<MaterialKind>,
-    /// How far a tile of light may be off, as a share of the built-in tracer's mean in `means`; smaller where all surfaces are
-    /// Lambertian.
+    /// How far a tile of light may be off, as a share of the built-in tracer's mean in `means`; smaller where all
+    /// surfaces are Lambertian.
     pub tile_bound: f64,
     /// Samples per pixel of each half that the built-in tracer rendered; 0 where no view was compared.
     pub samples_each_half: u32,
@@ -70,11 +70,11 @@ pub struct SceneComparison {
 pub struct SourceComparison {
     /// The view, the first that was compared.
     pub view: ViewId,
-    /// PSNR of the source's picture over valid pixels, times `exposure`, clipped and sRGB-encoded, in decibels, from the
-    /// product of both halves' errors, in which their noise cancels; null where that is not above 0.
+    /// PSNR of the source's picture over valid pixels, times `exposure`, clipped and sRGB-encoded, in decibels, from
+    /// the product of both halves' errors, in which their noise cancels; null where that is not above 0.
     pub psnr_db: Option<f64>,
-    /// RGB, first with the converted materials and then with the source's. Both are rendered with the same seeds, so that the
-    /// noise of the difference is at most what the standard errors state.
+    /// RGB, first with the converted materials and then with the source's. Both are rendered with the same seeds, so
+    /// that the noise of the difference is at most what the standard errors state.
     pub light: LightComparison,
 }
 
@@ -158,8 +158,8 @@ pub struct LightComparison {
     pub picture: String,
     /// The group's name; null for RGB.
     pub light: Option<String>,
-    /// Mean of each channel, first the built-in tracer's and then the other renderer's, over the valid pixels of the tiles
-    /// that decide, or over all of their pixels where none is valid. Every difference is relative to the first.
+    /// Mean of each channel, first the built-in tracer's and then the other renderer's, over the valid pixels of the
+    /// tiles that decide, or over all of their pixels where none is valid. Every difference is relative to the first.
     pub means: [[f64; 3]; 2],
     /// The difference of these means; null where no tile decides.
     pub mean: Option<MeanDifference>,
@@ -169,8 +169,8 @@ pub struct LightComparison {
     pub apart: Vec<TilesApart>,
 }
 
-/// The difference of two means, in the channel where it is largest in proportion to what is allowed there. All numbers are
-/// relative to the built-in tracer's mean in that channel.
+/// The difference of two means, in the channel where it is largest in proportion to what is allowed there. All numbers
+/// are relative to the built-in tracer's mean in that channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeanDifference {
@@ -194,9 +194,11 @@ pub struct TilesCompared {
     pub allowed: usize,
     /// Number of tiles that noise alone puts over the bound on average.
     pub expected_by_noise: f64,
-    /// Median of the absolute value of each tile's largest relative difference; null without tiles, or in a black picture.
+    /// Median of the absolute value of each tile's largest relative difference; null without tiles, or in a black
+    /// picture.
     pub median: Option<f64>,
-    /// Median of three standard errors divided by the bound; null as above. Above 5 the picture is too noisy for a verdict.
+    /// Median of three standard errors divided by the bound; null as above. Above 5 the picture is too noisy for a
+    /// verdict.
     pub noise: Option<f64>,
     /// The tile that is furthest over the bound, or nearest to it where none is over.
     pub worst: Option<WorstTile>,
@@ -214,8 +216,8 @@ pub struct WorstTile {
     pub off: MeanDifference,
 }
 
-/// Tiles that show a kind of material that is known to differ. A tile that shows several such kinds counts for the last of
-/// them in the order of [`MaterialKind`].
+/// Tiles that show a kind of material that is known to differ. A tile that shows several such kinds counts for the last
+/// of them in the order of [`MaterialKind`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TilesApart {
@@ -375,35 +377,38 @@ pub const BOUNDS: Bounds = Bounds {
     group_sum: GROUP_SUM,
 };
 
-/// Smallest PSNR of base colours, in decibels. An error of 1 % in every pixel gives 40 dB. Different places within a pixel
-/// cause less; a texture that is mirrored, shifted by a texel or decoded by another curve causes more.
+/// Smallest PSNR of base colours, in decibels. An error of 1 % in every pixel gives 40 dB. Different places within a
+/// pixel cause less; a texture that is mirrored, shifted by a texel or decoded by another curve causes more.
 pub const BASE_COLOR_PSNR_DB: f64 = 40.0;
 
-/// Smallest share of equal ids away from edges. Both renderers look through pixel centres; the rest allows for surfaces in
-/// the same plane, either of which may be hit first.
+/// Smallest share of equal ids away from edges. Both renderers look through pixel centres; the rest allows for surfaces
+/// in the same plane, either of which may be hit first.
 pub const EQUAL_ID_SHARE: f64 = 0.99;
 
-/// Largest median difference of depths, in metres. Blender stores positions as 32-bit floats, which are exact to microns in
-/// a room.
+/// Largest median difference of depths, in metres. Blender stores positions as 32-bit floats, which are exact to
+/// microns in a room.
 pub const DEPTH_MEDIAN_M: f64 = 1e-3;
 
-/// Largest median angle between normals, in degrees. The dataset's normals are 16-bit floats, whose rounding turns them by
-/// up to 0.04 degrees.
+/// Largest median angle between normals, in degrees. The dataset's normals are 16-bit floats, whose rounding turns them
+/// by up to 0.04 degrees.
 pub const NORMAL_MEDIAN_DEG: f64 = 0.5;
 
-/// How far a tile may be off where all materials are Lambertian, as a share of the picture's mean over valid pixels. On such
-/// scenes the built-in tracer, Mitsuba and Blender agree to 0.02 %; what remains is how each samples textures and edges.
+/// How far a tile may be off where all materials are Lambertian, as a share of the picture's mean over valid pixels. On
+/// such scenes the built-in tracer, Mitsuba and Blender agree to 0.02 %; what remains is how each samples textures and
+/// edges.
 pub const LAMBERT_TILE: f64 = 0.01;
 
-/// How far a tile may be off in any other scene, as a share of the same mean. The built-in tracer approximates the energy of
-/// Blender's principled material by tables, and light that was scattered by metal, plastic or glass reaches all tiles.
+/// How far a tile may be off in any other scene, as a share of the same mean. The built-in tracer approximates the
+/// energy of Blender's principled material by tables, and light that was scattered by metal, plastic or glass reaches
+/// all tiles.
 pub const OTHER_TILE: f64 = 0.02;
 
-/// Share of the tiles that may be over their bound: at edges of lamps and in corners of the room a single texel decides.
+/// Share of the tiles that may be over their bound: at edges of lamps and in corners of the room a single texel
+/// decides.
 pub const TILE_SHARE_OVER: f64 = 0.01;
 
-/// How far a picture's mean may be off, as a share of itself. Differences between tiles average out over a picture; a lamp
-/// of a different strength does not.
+/// How far a picture's mean may be off, as a share of itself. Differences between tiles average out over a picture; a
+/// lamp of a different strength does not.
 pub const PICTURE_MEAN: f64 = 0.005;
 
 /// Number of standard errors added to every bound of light. A normal deviate is further off once in 370 times.
@@ -412,8 +417,8 @@ pub const STANDARD_ERRORS: f64 = 3.0;
 /// Where the added standard errors exceed the bound by this factor, agreement has no meaning.
 pub const NOISE_OVER_BOUND: f64 = 5.0;
 
-/// How far the sum of a half's groups may be from the half, as a share of the pixel's value, or of the picture's mean where
-/// the pixel is darker. Sums of 32-bit floats over thousands of samples keep at least four digits.
+/// How far the sum of a half's groups may be from the half, as a share of the pixel's value, or of the picture's mean
+/// where the pixel is darker. Sums of 32-bit floats over thousands of samples keep at least four digits.
 pub const GROUP_SUM: f64 = 1e-3;
 
 /// How often noise alone may make a picture count as different by its number of tiles.

@@ -149,8 +149,8 @@ pub(super) fn angle_deg(a: Normal, b: Normal) -> f64 {
     libm::atan2(a.cross(b).length(), a.dot(b)).to_degrees()
 }
 
-/// Pixels in which both renderers show the same instance; where Blender's ids are missing, all pixels in which the dataset
-/// shows one.
+/// Pixels in which both renderers show the same instance; where Blender's ids are missing, all pixels in which the
+/// dataset shows one.
 fn common(ours: &OurGeometry, theirs: Option<&Picture<u16>>) -> Vec<usize> {
     let same = |at: usize, id: u16| theirs.is_none_or(|theirs| theirs.pixels()[at] == id);
     let ids = ours.instance.pixels().iter().enumerate();

@@ -1,7 +1,8 @@
 //! Compares pictures of light, RGB and each light group: by tiles, and by their means.
 //!
-//! In: two halves of a picture from each renderer. The mean of a pixel's halves a and b has a variance whose expected value
-//! is that of ((a - b) / 2)², whatever the distribution. The variances of a tile's pixels and of both renderers add up.
+//! In: two halves of a picture from each renderer. The mean of a pixel's halves a and b has a variance whose expected
+//! value is that of ((a - b) / 2)², whatever the distribution. The variances of a tile's pixels and of both renderers
+//! add up.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,16 +16,18 @@ use super::file::{
 
 /// The tiles of a view with the kinds of material that they show, and the pixels that count.
 pub(super) struct ShownKinds {
-    /// Each tile with the last kind, in the order of [`MaterialKind`], that it shows; none where it shows only background.
+    /// Each tile with the last kind, in the order of [`MaterialKind`], that it shows; none where it shows only
+    /// background.
     tiles: Vec<(Tile, Option<MaterialKind>)>,
-    /// Pixels whose mean is compared, and to which differences are relative: the valid pixels of the tiles that decide, or all
-    /// of their pixels where none is valid. Lamps, sky and glass are not valid. A window that fills a tenth of the picture
-    /// would otherwise dominate the mean, and no error within the room would be large in proportion to it.
+    /// Pixels whose mean is compared, and to which differences are relative: the valid pixels of the tiles that decide,
+    /// or all of their pixels where none is valid. Lamps, sky and glass are not valid. A window that fills a tenth of
+    /// the picture would otherwise dominate the mean, and no error within the room would be large in proportion to it.
     counted: Vec<(usize, usize)>,
 }
 
 impl ShownKinds {
-    /// `kinds[k - 1]` is the kind of instance k. An index beyond the list, which no sound dataset contains, has no kind.
+    /// `kinds[k - 1]` is the kind of instance k. An index beyond the list, which no sound dataset contains, has no
+    /// kind.
     pub(super) fn new(instance: &Picture<u16>, kinds: &[MaterialKind], valid: &Mask) -> Self {
         let kind_at = |x: usize, y: usize| kinds.get(usize::from(instance.get(x, y)).checked_sub(1)?).copied();
         let of = |tile: &Tile| tile.pixels().filter_map(|(x, y)| kind_at(x, y)).max();
@@ -64,8 +67,8 @@ impl ShownKinds {
     }
 }
 
-/// Compares one picture of both renderers. Returns two checks, of its tiles and of its mean, and the measurements behind
-/// them.
+/// Compares one picture of both renderers. Returns two checks, of its tiles and of its mean, and the measurements
+/// behind them.
 pub(super) fn compare(
     picture: &str,
     light: Option<String>,
@@ -212,8 +215,8 @@ fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], pixels: usize) 
     Check { picture: picture.to_owned(), quantity, state, measured, bound, count: pixels, message }
 }
 
-/// A check that differs where both halves are the same picture and not black: their difference then says nothing about the
-/// noise.
+/// A check that differs where both halves are the same picture and not black: their difference then says nothing about
+/// the noise.
 pub(super) fn same_halves(picture: &str, halves: &Halves) -> Option<Check> {
     let is_black = |pixel: &LinearRgb| pixel.0 == [0.0; 3];
     let same = halves.a == halves.b && !halves.a.pixels().iter().all(is_black);
@@ -221,8 +224,9 @@ pub(super) fn same_halves(picture: &str, halves: &Halves) -> Option<Check> {
     same.then(|| file_check(picture, State::Differs, message))
 }
 
-/// Whether the light groups of a half sum to it. A pixel's difference is relative to the pixel, since rounding grows with
-/// the value, or to the half's mean where the pixel is darker, since there rounding grows with the samples added up.
+/// Whether the light groups of a half sum to it. A pixel's difference is relative to the pixel, since rounding grows
+/// with the value, or to the half's mean where the pixel is darker, since there rounding grows with the samples added
+/// up.
 pub(super) fn sum_check(picture: &str, half: &Picture<LinearRgb>, groups: &[&Picture<LinearRgb>]) -> Check {
     let values = half.pixels().iter().flat_map(|pixel| pixel.0).map(f64::from);
     let mean = values.sum::<f64>() / (3 * half.pixels().len().max(1)) as f64;
@@ -284,8 +288,9 @@ pub(super) struct Difference {
     pub(super) error: [f64; 3],
 }
 
-/// Divides a picture into tiles of 16x16 pixels. A remainder of at least 8 pixels at the right or lower edge is a tile of its
-/// own. A smaller one belongs to its neighbour, since the variance of a few pixels is not known well enough for a test.
+/// Divides a picture into tiles of 16x16 pixels. A remainder of at least 8 pixels at the right or lower edge is a tile
+/// of its own. A smaller one belongs to its neighbour, since the variance of a few pixels is not known well enough for
+/// a test.
 pub(super) fn tiles(width: usize, height: usize) -> Vec<Tile> {
     let columns = cuts(width);
     let rows = cuts(height);
@@ -360,8 +365,8 @@ pub(super) fn difference(
 }
 
 impl Difference {
-    /// The difference in each channel divided by what is allowed there: the bound times `scale`, plus three standard errors.
-    /// Above 1 the channel is over the bound; a channel that is black in both pictures gives 0.
+    /// The difference in each channel divided by what is allowed there: the bound times `scale`, plus three standard
+    /// errors. Above 1 the channel is over the bound; a channel that is black in both pictures gives 0.
     pub(super) fn excess(&self, bound: f64, scale: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|c| match self.mean[c].abs() {
             0.0 => 0.0,
@@ -380,14 +385,15 @@ impl Difference {
         self.excess(bound, scale).iter().any(|excess| *excess > 1.0)
     }
 
-    /// Three standard errors divided by the bound, in the channel where this is largest; none where `scale` is 0 in all.
+    /// Three standard errors divided by the bound, in the channel where this is largest; none where `scale` is 0 in
+    /// all.
     pub(super) fn noise(&self, bound: f64, scale: [f64; 3]) -> Option<f64> {
         let of = |c: usize| (scale[c] > 0.0).then(|| STANDARD_ERRORS * self.error[c] / (bound * scale[c]));
         (0..3).filter_map(of).max_by(f64::total_cmp)
     }
 
-    /// An upper limit of the probability that noise alone puts it over the bound where the expected values are equal: two
-    /// tails of a normal distribution in each channel.
+    /// An upper limit of the probability that noise alone puts it over the bound where the expected values are equal:
+    /// two tails of a normal distribution in each channel.
     fn false_alarm(&self, bound: f64, scale: [f64; 3]) -> f64 {
         let tails = |c: usize| {
             let errors = STANDARD_ERRORS + bound * scale[c] / self.error[c];
@@ -397,9 +403,10 @@ impl Difference {
     }
 }
 
-/// How many of the tiles may be over the bound, and how many noise alone puts there on average. Allowed are 1 % of the tiles,
-/// plus the number that noise alone exceeds at most once in 1000 pictures. The latter is 0 where the noise is small compared
-/// with the bound. Where it is not, three channels at three standard errors would use up the 1 % for noise.
+/// How many of the tiles may be over the bound, and how many noise alone puts there on average. Allowed are 1 % of the
+/// tiles, plus the number that noise alone exceeds at most once in 1000 pictures. The latter is 0 where the noise is
+/// small compared with the bound. Where it is not, three channels at three standard errors would use up the 1 % for
+/// noise.
 pub(super) fn allowance(tiles: &[Difference], bound: f64, scale: [f64; 3]) -> (usize, f64) {
     let expected = tiles.iter().map(|tile| tile.false_alarm(bound, scale)).sum();
     ((TILE_SHARE_OVER * tiles.len() as f64) as usize + poisson_quantile(expected), expected)
@@ -448,7 +455,8 @@ mod tests {
         -libm::log((splitmix64::number(0, seed) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-300) - 1.0
     }
 
-    /// Two halves of a gradient with relative noise of this standard deviation per pixel; `factor` scales the expected value.
+    /// Two halves of a gradient with relative noise of this standard deviation per pixel; `factor` scales the expected
+    /// value.
     fn halves(seed: u64, noise: f64, factor: impl Fn(usize, usize) -> f64) -> Halves {
         let half = |half: u64| {
             Picture::from_fn(SIZE.0, SIZE.1, |x, y| {
@@ -495,7 +503,8 @@ mod tests {
         }
     }
 
-    /// The standard error computed from the halves equals the spread of 400 draws within 10 %, in a tile and over the picture.
+    /// The standard error computed from the halves equals the spread of 400 draws within 10 %, in a tile and over the
+    /// picture.
     #[test]
     fn the_standard_error_is_the_spread() {
         let all = tiles(SIZE.0, SIZE.1);
@@ -509,10 +518,10 @@ mod tests {
         }
     }
 
-    /// Pure noise, 1000 pictures at each of three levels: three standard errors of a tile at 1, 4 and 20 times the bound. By
-    /// design at most one picture in 1000 counts as different by its tiles (5 in 1000 would have a probability of 6e-4). By its
-    /// mean, 8 in 1000 do where the bound is negligible: three channels at three standard errors. Allowing only 1 % of the
-    /// tiles, which is none of 30, would give 21 false alarms at the second level.
+    /// Pure noise, 1000 pictures at each of three levels: three standard errors of a tile at 1, 4 and 20 times the
+    /// bound. By design at most one picture in 1000 counts as different by its tiles (5 in 1000 would have a
+    /// probability of 6e-4). By its mean, 8 in 1000 do where the bound is negligible: three channels at three standard
+    /// errors. Allowing only 1 % of the tiles, which is none of 30, would give 21 false alarms at the second level.
     #[test]
     #[allow(clippy::print_stderr, reason = "shows how close the counts are to their limits")]
     fn noise_alone_rarely_counts_as_a_difference() {
@@ -535,8 +544,8 @@ mod tests {
         }
     }
 
-    /// An error of 3 % everywhere is found, and one of 8 % in one tile of 30, where 1 % of the tiles is none. The twins, errors
-    /// of 0.3 % and 1 %, agree.
+    /// An error of 3 % everywhere is found, and one of 8 % in one tile of 30, where 1 % of the tiles is none. The
+    /// twins, errors of 0.3 % and 1 %, agree.
     #[test]
     fn planted_differences_are_found() {
         for draw in 0..100 {
@@ -559,8 +568,8 @@ mod tests {
         assert_eq!(states(&plain(1, 0.0), &plain(2, 0.0)), [State::Agrees; 2]);
     }
 
-    /// A window fills a tenth of the picture and is a hundred times brighter than the room. An error of 3 % in the room's light
-    /// is found, since the window is not valid and does not contribute to the mean.
+    /// A window fills a tenth of the picture and is a hundred times brighter than the room. An error of 3 % in the
+    /// room's light is found, since the window is not valid and does not contribute to the mean.
     #[test]
     fn a_bright_window_hides_nothing() {
         let is_window = |x: usize, y: usize| x < 32 && y < 24;
@@ -594,8 +603,8 @@ mod tests {
         assert_eq!(states(&red(1), &plain(2, 0.1)), [State::Differs; 2]);
     }
 
-    /// The left third shows glass, the middle a metal beside Lambert. These tiles do not count for the verdict, whatever they
-    /// contain, and are reported apart.
+    /// The left third shows glass, the middle a metal beside Lambert. These tiles do not count for the verdict,
+    /// whatever they contain, and are reported apart.
     #[test]
     fn materials_that_are_known_to_differ_do_not_count() {
         let kinds = [MaterialKind::Lambert, MaterialKind::Conductor, MaterialKind::Dielectric];

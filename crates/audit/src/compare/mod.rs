@@ -1,11 +1,11 @@
 //! Compares Blender's pictures of a dataset with those of the built-in tracer, view by view.
 //!
-//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`report`] prints as tables; its verdict, which is kept in
-//! the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
+//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`report`] prints as tables; its verdict, which is
+//! kept in the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
 //!
-//! Between: `pictures` reads Blender's pictures and renders ours; `geometry` compares pictures without light, and `light`
-//! compares pictures of light tile by tile. [`mod@file`] states which materials may differ and how far. Converted materials
-//! are compared with the source's own by the built-in tracer's pictures of both.
+//! Between: `pictures` reads Blender's pictures and renders ours; `geometry` compares pictures without light, and
+//! `light` compares pictures of light tile by tile. [`mod@file`] states which materials may differ and how far.
+//! Converted materials are compared with the source's own by the built-in tracer's pictures of both.
 
 pub mod file;
 mod geometry;
@@ -48,8 +48,8 @@ pub struct CompareOptions {
     pub dataset: PathBuf,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,
-    /// Samples per pixel of each half that the built-in tracer renders. Where absent, as few as leave the decision to Blender's
-    /// noise or to the bound, and at most as many as Blender's.
+    /// Samples per pixel of each half that the built-in tracer renders. Where absent, as few as leave the decision to
+    /// Blender's noise or to the bound, and at most as many as Blender's.
     pub samples: Option<u32>,
     /// Folder for the page; no page is written where absent.
     pub out: Option<PathBuf>,
@@ -57,9 +57,9 @@ pub struct CompareOptions {
     pub force: bool,
 }
 
-/// Compares the pictures of the dataset's scenes, and writes the outcomes to the dataset's `compare.json`. Scenes with a photo
-/// from elsewhere are left out. A view that Blender has not rendered is reported as `missing`; fails where that is every view
-/// of the others.
+/// Compares the pictures of the dataset's scenes, and writes the outcomes to the dataset's `compare.json`. Scenes with
+/// a photo from elsewhere are left out. A view that Blender has not rendered is reported as `missing`; fails where that
+/// is every view of the others.
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
     let mut scenes = dataset.chosen_scenes(&options.scenes)?;
@@ -311,8 +311,8 @@ impl ViewPair<'_> {
         Ok((found, Some(previews)))
     }
 
-    /// Compares RGB, each light group, and the sum of the groups. Returns Blender's pictures in this order; none for those
-    /// that could not be read.
+    /// Compares RGB, each light group, and the sum of the groups. Returns Blender's pictures in this order; none for
+    /// those that could not be read.
     fn compare_lights(
         &self,
         light: &OurLight,
@@ -390,8 +390,8 @@ impl Converted<'_> {
         Ok(Some(SourceComparison { view: self.view.id.clone(), psnr_db, light }))
     }
 
-    /// The mean over valid pixels of the product of the halves' errors, which are independent of each other, as a preview
-    /// shows them; none where no pixel is valid.
+    /// The mean over valid pixels of the product of the halves' errors, which are independent of each other, as a
+    /// preview shows them; none where no pixel is valid.
     fn error_without_noise(&self, theirs: &Halves, valid: &Mask) -> Option<f64> {
         let errors = [(&self.rgb.a, &theirs.a), (&self.rgb.b, &theirs.b)]
             .map(|(ours, theirs)| (self.exposed(ours).to_srgb(), self.exposed(theirs).to_srgb()));

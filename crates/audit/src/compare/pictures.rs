@@ -1,7 +1,7 @@
 //! The two renderers' pictures: reads Blender's, decides how many samples ours take, and renders ours.
 //!
-//! Ours take as few samples as leave the decision to Blender's noise or to the bound. A pilot of few samples measures our
-//! noise in each tile. It falls in proportion to the number of samples.
+//! Ours take as few samples as leave the decision to Blender's noise or to the bound. A pilot of few samples measures
+//! our noise in each tile. It falls in proportion to the number of samples.
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,8 @@ pub(super) struct TheirView {
 }
 
 impl TheirView {
-    /// Reads a picture. Fails with the check that reports why it could not be read. `picture` is its name without extension.
+    /// Reads a picture. Fails with the check that reports why it could not be read. `picture` is its name without
+    /// extension.
     pub(super) fn read<T: Copy>(
         &self,
         picture: &str,
@@ -130,8 +131,8 @@ pub(super) fn most_samples(views: &[TheirView]) -> Result<u32, AuditError> {
     Ok(most)
 }
 
-/// The number of samples at which the pictures of a view are noisy enough for its comparison, from its pilot. A picture of
-/// Blender's that cannot be read asks for none; its check reports it.
+/// The number of samples at which the pictures of a view are noisy enough for its comparison, from its pilot. A picture
+/// of Blender's that cannot be read asks for none; its check reports it.
 pub(super) fn wanted_samples(pilot: &OurLight, theirs: &TheirView, shown: &ShownKinds, bound: f64) -> u32 {
     let groups = pilot.groups.iter().enumerate().map(|(at, group)| (format!("group_{at:02}"), group));
     let pictures = std::iter::once(("rgb".to_owned(), &pilot.rgb)).chain(groups);
@@ -143,8 +144,8 @@ pub(super) fn wanted_samples(pilot: &OurLight, theirs: &TheirView, shown: &Shown
     (f64::from(PILOT) * most).ceil() as u32
 }
 
-/// By how much our variance exceeds what is allowed, in the median tile; none where no tile decides. Allowed is Blender's own
-/// variance, or that at which [`SHARE_OF_BOUND`] is met.
+/// By how much our variance exceeds what is allowed, in the median tile; none where no tile decides. Allowed is
+/// Blender's own variance, or that at which [`SHARE_OF_BOUND`] is met.
 fn ratio([ours, theirs]: [&Halves; 2], shown: &ShownKinds, bound: f64) -> Option<f64> {
     let scale = ours.means(shown.counted());
     let of_tile = |tile: &Tile| {
@@ -181,7 +182,8 @@ mod tests {
         // Twice and half the noise: four times and a quarter of the samples.
         assert!((ratio(0.4, 0.2) - 4.0).abs() < 1e-3);
         assert!((ratio(0.2, 0.4) - 0.25).abs() < 1e-4);
-        // Without noise of theirs: three standard errors of 16 * 16 pixels, each off by 0.1 / 2, against 0.5 * 0.01 * 0.5.
+        // Without noise of theirs: three standard errors of 16 * 16 pixels, each off by 0.1 / 2, against 0.5 * 0.01 *
+        // 0.5.
         let errors: f64 = 3.0 * (0.1 / 2.0) / 16.0;
         let expected = (errors / 0.0025).powi(2);
         assert!((ratio(0.1, 0.0) / expected - 1.0).abs() < 1e-3);

@@ -1,5 +1,5 @@
-//! Shows the comparison: as tables, whose numbers are rounded while the JSON has all digits, and as a page with the pictures
-//! of both renderers side by side and their difference, as 8-bit PNG.
+//! Shows the comparison: as tables, whose numbers are rounded while the JSON has all digits, and as a page with the
+//! pictures of both renderers side by side and their difference, as 8-bit PNG.
 
 use std::path::{Path, PathBuf};
 

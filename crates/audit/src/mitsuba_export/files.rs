@@ -1,5 +1,6 @@
-//! Files as Mitsuba 3 reads them: XML with elements for plugins and their parameters, and meshes as binary PLY, oriented so
-//! that Mitsuba takes the same side as the front as the built-in tracer does; and the findings about what it cannot express.
+//! Files as Mitsuba 3 reads them: XML with elements for plugins and their parameters, and meshes as binary PLY,
+//! oriented so that Mitsuba takes the same side as the front as the built-in tracer does; and the findings about what
+//! it cannot express.
 
 use std::fmt::Write as _;
 
@@ -67,8 +68,8 @@ impl Element {
         self.child(Self::new("transform").named(name).child(Self::new("matrix").attribute("value", value)))
     }
 
-    /// Sets a comment before the element that names what it was made from. Characters that could end the comment or control
-    /// a terminal are replaced.
+    /// Sets a comment before the element that names what it was made from. Characters that could end the comment or
+    /// control a terminal are replaced.
     pub(super) fn remark(mut self, name: &str) -> Self {
         let plain = |c: char| if c.is_alphanumeric() || " ._/()".contains(c) { c } else { '_' };
         self.remark = Some(name.chars().take(100).map(plain).collect());
@@ -130,7 +131,8 @@ impl Remarks {
         self.add(Severity::Warning, code, place, message, action);
     }
 
-    /// Adds a note: this part means the same in Mitsuba, or differs so little that only a very long render would show it.
+    /// Adds a note: this part means the same in Mitsuba, or differs so little that only a very long render would show
+    /// it.
     pub(super) fn note(&mut self, code: &str, place: &str, message: &str, action: &str) {
         self.add(Severity::Note, code, place, message, action);
     }

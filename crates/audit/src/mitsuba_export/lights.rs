@@ -121,10 +121,10 @@ fn place(index: usize, group: &LightGroup) -> String {
     format!("light {index} '{}'", group.name)
 }
 
-/// The map resampled for Mitsuba 3, which looks it up in another way: its row i lies at i / (rows - 1) of the way from pole
-/// to pole, ours at (i + 0.5) / rows. With 2 * rows + 1 rows, ours become the odd ones. The even ones lie halfway between
-/// them, or repeat the nearest row at the poles, where our lookup clamps. Linear interpolation then gives the same values
-/// everywhere.
+/// The map resampled for Mitsuba 3, which looks it up in another way: its row i lies at i / (rows - 1) of the way from
+/// pole to pole, ours at (i + 0.5) / rows. With 2 * rows + 1 rows, ours become the odd ones. The even ones lie halfway
+/// between them, or repeat the nearest row at the poles, where our lookup clamps. Linear interpolation then gives the
+/// same values everywhere.
 fn stretched(texture: &Texture) -> Picture<LinearRgb> {
     let (width, height) = (texture.width(), texture.height());
     // Mitsuba requires at least two columns.
@@ -139,8 +139,8 @@ fn stretched(texture: &Texture) -> Picture<LinearRgb> {
 /// How far triangles may overlap by rounding, in uv.
 const SLACK: f64 = 1e-6;
 
-/// Whether every place of the mesh has its own uv within 0..1: triangles lie in the unit square, have area there, and do not
-/// overlap. Triangles without area in the world do not count.
+/// Whether every place of the mesh has its own uv within 0..1: triangles lie in the unit square, have area there, and
+/// do not overlap. Triangles without area in the world do not count.
 pub(super) fn is_unfolded(mesh: &TriangleMesh) -> bool {
     let Some(uvs) = &mesh.uvs else { return false };
     let has_area = |triangle: &usize| {

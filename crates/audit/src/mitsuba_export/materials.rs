@@ -1,4 +1,5 @@
-//! Writes materials as Mitsuba's BSDF plugins, and their textures: files of their texels, and the parameters of their lookup.
+//! Writes materials as Mitsuba's BSDF plugins, and their textures: files of their texels, and the parameters of their
+//! lookup.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -236,8 +237,9 @@ impl<'a> TextureFiles<'a> {
     }
 }
 
-/// The texture times `radiance`, as the parameter `radiance` of the lights of group `group`. It is written below `folder` as
-/// floats and marked `raw`: Mitsuba cannot scale a texture, and takes that of a light for a reflectance otherwise.
+/// The texture times `radiance`, as the parameter `radiance` of the lights of group `group`. It is written below
+/// `folder` as floats and marked `raw`: Mitsuba cannot scale a texture, and takes that of a light for a reflectance
+/// otherwise.
 pub(super) fn radiance_map(
     folder: &Path,
     group: usize,
@@ -277,8 +279,8 @@ fn rows_downwards(uv: &UvTransform) -> [[f64; 4]; 4] {
     [[a, b, 0.0, c], [-d, -e, 0.0, 1.0 - f], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Writes a texture's colours, or one of its channels, so that Mitsuba reads exactly the same numbers: as bytes where they
-/// are encoded as Mitsuba decodes them, otherwise as floats. Returns the file's path below `folder`.
+/// Writes a texture's colours, or one of its channels, so that Mitsuba reads exactly the same numbers: as bytes where
+/// they are encoded as Mitsuba decodes them, otherwise as floats. Returns the file's path below `folder`.
 fn write_texture(folder: &Path, texture: &Texture, index: usize, channel: Option<usize>) -> Result<String, ImageError> {
     let (width, height) = (texture.width(), texture.height());
     let stem = match channel {

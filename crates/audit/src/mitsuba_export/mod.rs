@@ -1,11 +1,12 @@
 //! Writes a scene for Mitsuba 3 that means the same there as to the built-in tracer.
 //!
-//! In: a [`ReferenceScene`], a [`Camera`] and [`RenderSettings`], or a view of a dataset. Out: a folder with `scene.xml`
-//! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that Mitsuba cannot express.
-//! The scene contains the nearest that it can.
+//! In: a [`ReferenceScene`], a [`Camera`] and [`RenderSettings`], or a view of a dataset. Out: a folder with
+//! `scene.xml` (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that
+//! Mitsuba cannot express. The scene contains the nearest that it can.
 //!
-//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights; `files` writes XML
-//! and meshes. Names of the source appear in comments of the XML only, so that no name can become a path or markup.
+//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights; `files`
+//! writes XML and meshes. Names of the source appear in comments of the XML only, so that no name can become a path or
+//! markup.
 
 mod files;
 mod lights;
@@ -75,8 +76,8 @@ fn find_view<'d>(dataset: &'d Dataset, options: &ExportOptions) -> Result<&'d Vi
 
 /// Writes the scene to the folder `out`, replacing one that exists. After a failure no partial folder is left.
 ///
-/// Of the settings it uses samples, seed and `max_bounces`. A warning reports what means something else in Mitsuba. Fails
-/// where a file cannot be written.
+/// Of the settings it uses samples, seed and `max_bounces`. A warning reports what means something else in Mitsuba.
+/// Fails where a file cannot be written.
 pub fn export(
     scene: &ReferenceScene,
     camera: &Camera,
@@ -264,8 +265,8 @@ mod tests {
 
     use super::*;
 
-    /// The direction of the picture's corner, computed here from the matrix and field of view as Mitsuba does (PEERS B3: +Z
-    /// ahead, +X left), equals that of our camera.
+    /// The direction of the picture's corner, computed here from the matrix and field of view as Mitsuba does (PEERS
+    /// B3: +Z ahead, +X left), equals that of our camera.
     #[test]
     fn the_corner_pixel_looks_the_same_way() {
         let intrinsics = Intrinsics::from_fov_x(64, 48, 1.1);
@@ -315,7 +316,8 @@ mod tests {
         Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, Intrinsics::from_fov_x(8, 6, 1.0)).unwrap()
     }
 
-    /// The codes of an export's findings and the text of its `scene.xml`. Checks that every file that it refers to exists.
+    /// The codes of an export's findings and the text of its `scene.xml`. Checks that every file that it refers to
+    /// exists.
     fn exported(scene: &ReferenceScene) -> (Vec<(Severity, String)>, String) {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("out");
@@ -409,8 +411,8 @@ mod tests {
         }
     }
 
-    /// A lamp that emits on both sides becomes two flat shapes, any other surface one. A texture that is used twice is written
-    /// once.
+    /// A lamp that emits on both sides becomes two flat shapes, any other surface one. A texture that is used twice is
+    /// written once.
     #[test]
     fn shapes_and_files() {
         let mut scene = scene(vec![principled(PrincipledFlavour::Mitsuba), principled(PrincipledFlavour::Mitsuba)]);

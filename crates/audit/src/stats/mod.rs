@@ -38,10 +38,11 @@ pub struct StatsFile {
     pub houses: usize,
     /// Number of scenes of each kind of source, sorted by kind.
     pub source_kinds: Vec<SourceKindCount>,
-    /// Number of objects per scene ("Avg. Objects/Scene" of Table I); null where no scene states which instances are objects.
+    /// Number of objects per scene ("Avg. Objects/Scene" of Table I); null where no scene states which instances are
+    /// objects.
     pub objects_per_scene: Option<Spread>,
-    /// Number of different super-categories per scene ("Avg. Categories/Scene" of Table I, whose categories are the eight
-    /// super-categories); null as above.
+    /// Number of different super-categories per scene ("Avg. Categories/Scene" of Table I, whose categories are the
+    /// eight super-categories); null as above.
     pub super_categories_per_scene: Option<Spread>,
     /// Number of different categories per scene, of the objects that have a category; null as above.
     pub categories_per_scene: Option<Spread>,
@@ -73,8 +74,8 @@ pub struct SourceKindCount {
     pub scenes: usize,
 }
 
-/// The distribution over scenes of a number that each scene has. Scenes that do not state which instances are objects are
-/// not included, since their number is unknown and not zero.
+/// The distribution over scenes of a number that each scene has. Scenes that do not state which instances are objects
+/// are not included, since their number is unknown and not zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spread {
@@ -118,7 +119,8 @@ pub struct Counts {
     pub instances_with_atlas: usize,
     /// Number of those whose source does not state each parameter.
     pub unstated: UnstatedCounts,
-    /// The benchmark's eight super-categories in their order, with zero where no object has one; then all others, sorted.
+    /// The benchmark's eight super-categories in their order, with zero where no object has one; then all others,
+    /// sorted.
     pub super_categories: Vec<SuperCategoryCount>,
     /// The categories found, in the order of their super-categories and within each by decreasing number.
     pub categories: Vec<CategoryCount>,
@@ -195,8 +197,8 @@ pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, AuditError> {
 }
 
 impl SceneStats {
-    /// Whether the scene states which instances are objects. Rooms of 3D-FRONT do, so that a room without objects counts as
-    /// empty. The shapes of a Bitterli scene have names only.
+    /// Whether the scene states which instances are objects. Rooms of 3D-FRONT do, so that a room without objects
+    /// counts as empty. The shapes of a Bitterli scene have names only.
     pub fn knows_its_objects(&self) -> bool {
         self.counts.others < self.counts.instances || self.counts.instances == 0
     }
@@ -341,8 +343,8 @@ fn repeats<'a>(file: &str, list: &str, key: &str, ids: impl Iterator<Item = &'a 
         .collect()
 }
 
-/// An untrusted name, made safe to print: one line of at most `most` characters, without characters that control a terminal
-/// or reverse the direction of the text.
+/// An untrusted name, made safe to print: one line of at most `most` characters, without characters that control a
+/// terminal or reverse the direction of the text.
 pub(crate) fn shown(name: &str, most: usize) -> String {
     let is_control = |c: char| {
         c.is_control()
@@ -453,8 +455,8 @@ mod tests {
         count(dataset, "mateval test").unwrap()
     }
 
-    /// All expected numbers were counted by hand in the list above. The means are 7 / 2, 5 / 2 and 5 / 2, since the Bitterli
-    /// scene does not state which of its shapes are objects.
+    /// All expected numbers were counted by hand in the list above. The means are 7 / 2, 5 / 2 and 5 / 2, since the
+    /// Bitterli scene does not state which of its shapes are objects.
     #[test]
     fn hand_made_scenes_are_counted_exactly() {
         let stats = counted(&hand_made());

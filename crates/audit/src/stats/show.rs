@@ -1,8 +1,8 @@
-//! Shows the counts: as tables, and as an SVG chart with one bar per category, grouped by super-category, and a histogram of
-//! the number of objects per scene. Numbers are rounded here; the JSON has all digits.
+//! Shows the counts: as tables, and as an SVG chart with one bar per category, grouped by super-category, and a
+//! histogram of the number of objects per scene. Numbers are rounded here; the JSON has all digits.
 //!
-//! Positions and texts of the chart are computed here; the template `picture.j2` turns them into markup and escapes every
-//! name. The same counts give the same bytes.
+//! Positions and texts of the chart are computed here; the template `picture.j2` turns them into markup and escapes
+//! every name. The same counts give the same bytes.
 
 use mateval_scene::Severity;
 use mateval_scene::dataset::SUPER_CATEGORIES;
@@ -136,8 +136,8 @@ fn scenes(stats: &StatsFile) -> Table {
     Table { title: "Scenes".to_owned(), words: 3, rows }
 }
 
-/// One column for each of the eight super-categories. All other objects share a last column, which exists only where there
-/// are any.
+/// One column for each of the eight super-categories. All other objects share a last column, which exists only where
+/// there are any.
 fn scenes_by_super_category(stats: &StatsFile) -> Table {
     let has_more = stats.total.super_categories.len() > SUPER_CATEGORIES.len();
     let mut rows = vec![row(["scene"])];
@@ -285,8 +285,8 @@ fn several(count: usize, one: &str, more: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { more })
 }
 
-/// A heading for each super-category, and its categories beneath it. Rows beyond the limit are only counted. Moves `y` to
-/// the last row.
+/// A heading for each super-category, and its categories beneath it. Rows beyond the limit are only counted. Moves `y`
+/// to the last row.
 fn category_rows(stats: &StatsFile, y: &mut f64) -> Vec<Row> {
     let total = &stats.total;
     let most = total.categories.iter().map(|found| found.objects).max().unwrap_or(1);
@@ -373,8 +373,8 @@ impl Bin {
     }
 }
 
-/// Bins from the smallest to the largest value. Their width is the smallest of 1, 2, 5, 10, 20, ... that needs no more than
-/// [`MOST_COLUMNS`] bins.
+/// Bins from the smallest to the largest value. Their width is the smallest of 1, 2, 5, 10, 20, ... that needs no more
+/// than [`MOST_COLUMNS`] bins.
 fn bins(values: &[usize]) -> Vec<Bin> {
     let (Some(min), Some(max)) = (values.iter().min(), values.iter().max()) else { return Vec::new() };
     let widths = (0..u32::MAX).flat_map(|power| [1, 2, 5].map(|digit| digit * 10_usize.saturating_pow(power)));

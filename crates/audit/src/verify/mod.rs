@@ -22,8 +22,8 @@ use serde::de::DeserializeOwned;
 use self::scene::{check_scene_file, check_schema};
 use crate::AuditError;
 
-/// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound dataset has
-/// no finding of severity `error`. Fails where the folder contains no dataset.
+/// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound
+/// dataset has no finding of severity `error`. Fails where the folder contains no dataset.
 pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, AuditError> {
     let dataset_path = root.join(DATASET);
     if !dataset_path.is_file() {

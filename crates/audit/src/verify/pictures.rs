@@ -11,7 +11,8 @@ use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_tracer::World;
 use rayon::prelude::*;
 
-/// Distance between the columns and rows that are traced again. It is prime, so that no regular pattern escapes the check.
+/// Distance between the columns and rows that are traced again. It is prime, so that no regular pattern escapes the
+/// check.
 const STRIDE: usize = 7;
 /// Largest relative error of a depth: half a unit in the last place of an f32, and the rounding of the ray.
 const DEPTH_SLACK: f64 = 1e-5;

@@ -1,6 +1,6 @@
-//! Checks what a scene is rendered with: the photo renderer's pictures, that every view has them, at its size, and that the
-//! input view shows one of them; the photo of a scene that is not rendered; and the scorer's reference, with which scores
-//! under light compare.
+//! Checks what a scene is rendered with: the photo renderer's pictures, that every view has them, at its size, and that
+//! the input view shows one of them; the photo of a scene that is not rendered; and the scorer's reference, with which
+//! scores under light compare.
 
 use std::path::Path;
 
@@ -15,11 +15,12 @@ use mateval_scene::{Finding, RendererId, Severity, json};
 
 use super::scene::check_schema;
 
-/// Radiance times exposure below which every channel of an 8-bit sRGB picture is 0: half a step of the linear part of the
-/// transfer curve.
+/// Radiance times exposure below which every channel of an 8-bit sRGB picture is 0: half a step of the linear part of
+/// the transfer curve.
 const BLACK: f32 = 0.5 / 255.0 / 12.92;
 
-/// Reports an input picture that is black. A black group of lights is no fault: the sky of a closed room reaches nothing.
+/// Reports an input picture that is black. A black group of lights is no fault: the sky of a closed room reaches
+/// nothing.
 fn check_light(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
     let Some(view) = scene.view(INPUT) else { return };
     // A picture that cannot be read has been reported.
@@ -87,9 +88,10 @@ pub(super) fn check_photo(folder: &SceneFolder, scene: &SceneFile, photo: &Photo
 /// The folder of the reference, relative to the scene's.
 const FOLDER: &str = "ground_truth/renders/scorer";
 
-/// Reports a reference that was made from other files of the scene than the manifest lists, and one whose pictures are not
-/// those that it lists. Where there is none, scores under light cannot be computed: a warning, if the dataset's pictures are
-/// rendered. Without the ground truth there is nothing to check; a scene with a photo from elsewhere has no renders.
+/// Reports a reference that was made from other files of the scene than the manifest lists, and one whose pictures are
+/// not those that it lists. Where there is none, scores under light cannot be computed: a warning, if the dataset's
+/// pictures are rendered. Without the ground truth there is nothing to check; a scene with a photo from elsewhere has
+/// no renders.
 pub(super) fn check_scorer(
     root: &Path,
     folder: &SceneFolder,

@@ -1,6 +1,6 @@
-//! Checks what the files of a scene state: JSON files against the schemas generated from the Rust types, whether `scene.json`
-//! is consistent (indices, references, cameras), the meshes against the reference geometry, and baked materials against
-//! their atlases.
+//! Checks what the files of a scene state: JSON files against the schemas generated from the Rust types, whether
+//! `scene.json` is consistent (indices, references, cameras), the meshes against the reference geometry, and baked
+//! materials against their atlases.
 
 use std::collections::BTreeSet;
 use std::path::Path;

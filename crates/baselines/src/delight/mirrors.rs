@@ -35,7 +35,8 @@ const FLAT_SHARE: f64 = 0.8;
 const LEAST_CORRELATION: f64 = 0.6;
 /// The least slope of a mirror's radiance over the mirrored one, both as logarithms.
 const LEAST_SLOPE: f64 = 0.75;
-/// The least radiance that counts, as a share of the mean of what is compared, and the largest deviation of a logarithm.
+/// The least radiance that counts, as a share of the mean of what is compared, and the largest deviation of a
+/// logarithm.
 const DARKEST: f64 = 1e-4;
 const MOST_CONTRAST: f64 = 1.5;
 /// Pixels on each side over which slow changes are averaged, as a share of the photo's width.

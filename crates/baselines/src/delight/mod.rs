@@ -20,7 +20,6 @@ use mateval_light::joint_fit::{JointFitRules, JointTarget, fit_jointly};
 use mateval_scene::{Progress, Report};
 use mateval_tracer::noise_filter::{self, filtered_mean};
 use mateval_tracer::{PhotoCache, SplitLight, split_light};
-use serde::{Deserialize, Serialize};
 
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
@@ -28,18 +27,8 @@ use crate::geometry::SceneGeometry;
 pub use files::write;
 use mirrors::find_mirrors;
 use room::PartRoom;
-pub use room::{FittedLight, LightSource, PossibleLight};
+pub use room::{CandidateLights, FittedLight, LightSource, PossibleLight};
 use surfaces::{Surfaces, USUAL_ROUGHNESS, choose_roughness, part_colors, settings};
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CandidateLights {
-    /// What may glow in the room, the world around it, and the lights of a stage.
-    #[default]
-    Room,
-    /// The lights of a stage alone, as in PSDR-Room.
-    Stage,
-}
 
 /// How a photo is de-lit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -523,8 +512,8 @@ mod tests {
     }
 
     /// The base colour is at least 8 dB nearer to the truth than the photo is (the median), and no part is taken for a
-    /// mirror. Radiances are less certain: lamps trade light with one another, and with the colours of what the photo does
-    /// not show.
+    /// mirror. Radiances are less certain: lamps trade light with one another, and with the colours of what the photo
+    /// does not show.
     #[test]
     fn planted_rooms_are_delit() {
         let (mut gains, mut errors) = (Vec::new(), Vec::new());

@@ -218,8 +218,8 @@ struct LitPicture {
 struct RelitPhoto {
     /// The lights that bring most to the valid pixels, as they were fitted; the strongest first.
     strongest: Vec<LitPicture>,
-    /// The sum of the other lights, each times its factor, and the photo where a pixel shows neither a known surface nor
-    /// a light's emission, such as glass.
+    /// The sum of the other lights, each times its factor, and the photo where a pixel shows neither a known surface
+    /// nor a light's emission, such as glass.
     rest: Picture<LinearRgb>,
     /// The room with each light times its factor.
     whole: Picture<LinearRgb>,
@@ -325,8 +325,8 @@ impl LitRoom<'_> {
 /// Mixes the pictures of the lights.
 const MIX: &str = include_str!("mix_lights.js");
 const QUALITY: u8 = 90;
-/// The largest value that a picture of the page holds, times exposure; 1 is white. Brighter pixels stay white until their
-/// light is dimmed to an eighth.
+/// The largest value that a picture of the page holds, times exposure; 1 is white. Brighter pixels stay white until
+/// their light is dimmed to an eighth.
 const BRIGHTEST: f32 = 8.0;
 
 /// A scene on the page.

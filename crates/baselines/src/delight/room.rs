@@ -19,9 +19,18 @@ use mateval_tracer::{World, aov};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::CandidateLights;
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CandidateLights {
+    /// What may glow in the room, the world around it, and the lights of a stage.
+    #[default]
+    Room,
+    /// The lights of a stage alone, as in PSDR-Room.
+    Stage,
+}
 
 /// The least number of pixels that show that something glows, and how much: fewer may show edges alone.
 const LEAST_PIXELS: usize = 20;
@@ -204,8 +213,8 @@ fn grey() -> Material {
 /// A light that may shine, of radiance 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PossibleLight {
-    /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage; unique in its
-    /// scene.
+    /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage; unique in
+    /// its scene.
     pub name: String,
     pub source: LightSource,
 }

@@ -142,7 +142,8 @@ impl Donor {
         Err(ImportError::NoBaseColor { material: material.name.clone(), glows: material.glows })
     }
 
-    /// Gives the mean of its textures to every triangle without texture coordinates, which are NaN. Returns their number.
+    /// Gives the mean of its textures to every triangle without texture coordinates, which are NaN. Returns their
+    /// number.
     pub(super) fn use_means(&mut self) -> usize {
         let (mut flat, mut count) = (BTreeMap::new(), 0);
         for at in 0..self.triangles.len() {

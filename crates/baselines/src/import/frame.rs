@@ -11,9 +11,9 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 use mateval_scene::TriangleMesh;
 
-use super::ImportedFrame;
 use super::donor::Donor;
 use super::rebake::Correspondence;
+use super::report::ImportedFrame;
 
 /// The frame of a mesh, and the similarity that undoes it.
 #[derive(Clone, Debug, PartialEq)]

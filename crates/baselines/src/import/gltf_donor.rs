@@ -342,8 +342,8 @@ fn is_unit(value: &f32) -> bool {
     (-ROUNDING..=1.0 + ROUNDING).contains(value)
 }
 
-/// The colours of a primitive's vertices, clamped to 0 to 1. The error shows the largest of those that are out of range,
-/// which shows best whether they are bytes.
+/// The colours of a primitive's vertices, clamped to 0 to 1. The error shows the largest of those that are out of
+/// range, which shows best whether they are bytes.
 fn colors_in_range(colors: Vec<[f32; 3]>, primitive: usize, material: &str) -> Result<Vec<[f32; 3]>, ImportError> {
     let largest = |rgb: &[f32; 3]| rgb.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let outside = colors.iter().filter(|rgb| !rgb.iter().all(is_unit));

@@ -1,6 +1,6 @@
 //! Reads an OBJ with its MTL as a donor: base colour from `map_Kd` (sRGB) or else `Kd` (linear), roughness from
-//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`. Groups without a material, or with a `Kd` of 1 1 1 and no `map_Kd`,
-//! take the colours of their vertices (sRGB, as trimesh and MeshLab write them).
+//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`. Groups without a material, or with a `Kd` of 1 1 1 and no
+//! `map_Kd`, take the colours of their vertices (sRGB, as trimesh and MeshLab write them).
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -23,8 +23,8 @@ pub struct Baked {
     pub seen: Option<Mask>,
 }
 
-/// Bakes every instance that has an atlas, to the dataset's own size, and calls `each` with its place in the scene. With
-/// `keep_seen` texels that the input view shows hold the estimate.
+/// Bakes every instance that has an atlas, to the dataset's own size, and calls `each` with its place in the scene.
+/// With `keep_seen` texels that the input view shows hold the estimate.
 pub(super) fn bake_all(
     materials: &SceneMaterials<'_>,
     geometry: &SceneGeometry<'_>,

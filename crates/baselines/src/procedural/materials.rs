@@ -5,9 +5,11 @@
 //!
 //! A material continues a pattern. What remains of the estimate, such as a stain, wear or light that was not taken out,
 //! changes slowly. This residual at a place that the input view does not show is estimated by the mean of the residuals
-//! of the nearest seen points, weighted by their distance (Nadaraya 1964, Watson 1964) and drawn to 0 where none is near.
+//! of the nearest seen points, weighted by their distance (Nadaraya 1964, Watson 1964) and drawn to 0 where none is
+//! near.
 
 use std::array::from_fn;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
@@ -19,18 +21,56 @@ use mateval_procedural::graph::slots;
 use mateval_procedural::library::Class;
 use mateval_procedural::value::Type;
 use mateval_scene::dataset::Instance;
-use mateval_scene::{Progress, Report};
+use mateval_scene::{PartSetId, Progress, Report};
 use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::part_frame::{Chart, PartFrame};
 use super::part_samples::{PartSamples, Sample};
-use super::{FitMode, ProceduralOptions};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
 use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels};
 use crate::maps::{DEFAULT, Medians, median};
+
+/// How a graph is chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FitMode {
+    /// Orientation and sizes in closed form, acceptance by held-out pixels.
+    #[default]
+    Best,
+    /// In the way of PSDR-Room, for comparison: a grid of turns and scales, then gradient descent
+    /// ([`mateval_procedural::fit::paper`] states the differences).
+    Paper,
+}
+
+/// How the materials of parts are found and baked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProceduralOptions {
+    /// The part set; `None` stands for the parts of the source.
+    pub part_set: Option<PartSetId>,
+    pub mode: FitMode,
+    /// Whether texels that the input view shows hold the estimate, so that graphs fill only the others.
+    pub keep_seen: bool,
+    /// How much of what is random in a pattern is kept, 0 to 1. Its phase cannot be known: 1 looks most alike, 0 has
+    /// the least error.
+    pub detail: f64,
+    /// A folder of `.mtlx` files that are fitted beside the built-in graphs.
+    pub graphs: Option<PathBuf>,
+}
+
+impl ProceduralOptions {
+    /// Fails unless `detail` is 0 to 1.
+    pub fn check(&self) -> Result<(), BaselineError> {
+        if (0.0..=1.0).contains(&self.detail) { Ok(()) } else { Err(BaselineError::Detail(self.detail)) }
+    }
+}
+
+impl Default for ProceduralOptions {
+    fn default() -> Self {
+        Self { part_set: None, mode: FitMode::Best, keep_seen: false, detail: 1.0, graphs: None }
+    }
+}
 
 /// The parts of a scene with what was seen of each and its material.
 pub(super) struct SceneMaterials<'a> {

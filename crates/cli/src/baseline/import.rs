@@ -14,8 +14,8 @@ use crate::terminal::{Outcome, print, say, with_progress};
 
 #[derive(clap::Args)]
 pub struct ImportArgs {
-    /// Folder with `<scene>/<instance>.glb` or `<scene>.glb` (.gltf and .obj too), or with `<scene>.json`, which has one
-    /// material per part.
+    /// Folder with `<scene>/<instance>.glb` or `<scene>.glb` (.gltf and .obj too), or with `<scene>.json`, which has
+    /// one material per part.
     folder: PathBuf,
     #[command(flatten)]
     places: Places,

@@ -29,8 +29,8 @@ pub struct SurveyArgs {
     /// 3D-FRONT houses (JSON files) or folders of houses, relative to --source.
     #[arg(required = true)]
     houses: Vec<PathBuf>,
-    /// Folder that all paths are relative to, as in a recipe [default: the current folder; where a path is absolute, the
-    /// lowest folder that contains all paths].
+    /// Folder that all paths are relative to, as in a recipe [default: the current folder; where a path is absolute,
+    /// the lowest folder that contains all paths].
     #[arg(long)]
     source: Option<PathBuf>,
     /// Folder of the 3D-FUTURE models, relative to --source.
@@ -58,22 +58,23 @@ pub struct SurveyArgs {
     /// With --scenes: the most scenes of one house.
     #[arg(long, value_name = "NUMBER", requires = "scenes", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     scenes_per_house: u32,
-    /// Search this house only, and leave the survey of all to a later run without --house; may be given several times. It
-    /// is a house's file relative to --source, or the file's name without .json. Several processes may search different
-    /// houses of one survey at once.
+    /// Search this house only, and leave the survey of all to a later run without --house; may be given several times.
+    /// It is a house's file relative to --source, or the file's name without .json. Several processes may search
+    /// different houses of one survey at once.
     #[arg(long = "house", value_name = "HOUSE", conflicts_with = "scenes")]
     only: Vec<String>,
     /// Seed of the drawn cameras.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::from(u32::MAX)))]
     seed: u64,
-    /// Number of cameras drawn in each room; with the rules 3dlg it is the mean over a house's rooms, and large ones get more.
+    /// Number of cameras drawn in each room; with the rules 3dlg it is the mean over a house's rooms, and large ones
+    /// get more.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
     cameras_per_room: u32,
     /// Width and height of the scenes' pictures, in pixels [default: 480 270; 480 360 with the rules 3dlg].
     #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"], value_parser = clap::value_parser!(u32).range(16..=8192))]
     resolution: Vec<u32>,
-    /// Vertical field of view of the drawn cameras, in degrees: above 0, below 179 [default: 45; 73.74 with the rules 3dlg,
-    /// which is 90 degrees wide].
+    /// Vertical field of view of the drawn cameras, in degrees: above 0, below 179 [default: 45; 73.74 with the rules
+    /// 3dlg, which is 90 degrees wide].
     #[arg(long)]
     fov_y_deg: Option<f64>,
     /// Folder for the page, its thumbnails, the recipe and survey.json. A survey that was interrupted there is resumed.
@@ -335,8 +336,8 @@ pub struct RenderArgs {
 enum Only {
     /// Photos: every view by the renderer, its input view being what methods see.
     Photo,
-    /// The scorer's reference: its own render of the true materials, with which scores under light compare. A dataset of the
-    /// format before this one is brought up to date first.
+    /// The scorer's reference: its own render of the true materials, with which scores under light compare. A dataset
+    /// of the format before this one is brought up to date first.
     Scorer,
 }
 
@@ -424,7 +425,8 @@ fn render_references(args: &RenderArgs) -> anyhow::Result<()> {
 pub struct FinishArgs {
     /// Folder of the dataset.
     dataset: PathBuf,
-    /// Leave this scene of the recipe out; may be given several times. A later call without it takes the scene in again.
+    /// Leave this scene of the recipe out; may be given several times. A later call without it takes the scene in
+    /// again.
     #[arg(long, value_name = "SCENE")]
     without: Vec<SceneId>,
 }

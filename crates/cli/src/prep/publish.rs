@@ -39,11 +39,12 @@ pub struct PublishArgs {
 /// The report of a release.
 #[derive(clap::Args)]
 struct ReportArgs {
-    /// Folder for a page that describes the release. With --withhold it shows no measurement of single scenes' ground truth.
+    /// Folder for a page that describes the release. With --withhold it shows no measurement of single scenes' ground
+    /// truth.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
-    /// Verdicts for the report: a file of `prep compare`, or a folder with such files in it or directly below it; may be given
-    /// several times.
+    /// Verdicts for the report: a file of `prep compare`, or a folder with such files in it or directly below it; may
+    /// be given several times.
     #[arg(long, value_name = "PATH", requires = "report")]
     verdicts: Vec<PathBuf>,
     /// For the report: the result of the truth itself, `baseline gt`.
@@ -74,8 +75,8 @@ enum Withheld {
 }
 
 impl PublishArgs {
-    /// Checks what is given for the report, then splits the dataset and prints the commitment, a hash of the withheld files,
-    /// then writes the report.
+    /// Checks what is given for the report, then splits the dataset and prints the commitment, a hash of the withheld
+    /// files, then writes the report.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let options = release_options(self);
         let halves = halves(self)?;
@@ -122,8 +123,8 @@ fn halves(args: &PublishArgs) -> anyhow::Result<Option<[&PathBuf; 2]>> {
     Ok(Some([public, private]))
 }
 
-/// Fails where the report would lie in a folder of the split, which holds nothing but files of the dataset, or the other
-/// way round, where replacing the report would delete it.
+/// Fails where the report would lie in a folder of the split, which holds nothing but files of the dataset, or the
+/// other way round, where replacing the report would delete it.
 fn check_report(options: &ReleaseOptions, halves: &Option<[&PathBuf; 2]>) -> anyhow::Result<()> {
     let out = options.out.as_path();
     let lies_in = |inner: &Path, outer: &Path| inner.starts_with(outer) || is_inside(inner, outer);
@@ -171,7 +172,8 @@ pub struct ExportArgs {
     /// Folder to write.
     #[arg(long)]
     out: PathBuf,
-    /// For croissant: the address of the folder where the files will be published; without it their places are relative.
+    /// For croissant: the address of the folder where the files will be published; without it their places are
+    /// relative.
     #[arg(long)]
     url: Option<String>,
     /// For croissant: the day of publication, as in 2026-11-24.

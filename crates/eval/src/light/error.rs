@@ -1,19 +1,19 @@
 //! The mean squared error of a render, free of its noise, and the standard error of that.
 //!
-//! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the encoded
-//! difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is the squared
-//! true difference, whatever the noise. Each half consists of two quarters, whose difference u (of X) or v (of Y) has the
-//! half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the expectation of
-//! (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, whatever the distribution of the noise, if quarters are
-//! independent: of the squares d x, d y and x y that make the variance, the first two terms count x y twice, the last takes it
-//! away once.
-//! Where few large contributions make it small or negative, half of the first two terms counts, which in expectation is at least
-//! half of the variance.
+//! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the
+//! encoded difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is
+//! the squared true difference, whatever the noise. Each half consists of two quarters, whose difference u (of X) or v
+//! (of Y) has the half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the
+//! expectation of (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, whatever the distribution of the noise, if
+//! quarters are independent: of the squares d x, d y and x y that make the variance, the first two terms count x y
+//! twice, the last takes it away once. Where few large contributions make it small or negative, half of the first two
+//! terms counts, which in expectation is at least half of the variance.
 //!
-//! Pixels whose noise is correlated form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)): all sums are taken within blocks, and variances are
-//! added over them. Three effects are left out, being small where they were measured (`benches/spread.rs`): the halves share a
-//! little through the pivot of the other half, the filter that makes it reaches beyond a block, and R has noise of its own, which
-//! both halves have in common (`variance` in `scorer.json` states it).
+//! Pixels whose noise is correlated form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)): all
+//! sums are taken within blocks, and variances are added over them. Three effects are left out, being small where they
+//! were measured (`benches/spread.rs`): the halves share a little through the pivot of the other half, the filter that
+//! makes it reaches beyond a block, and R has noise of its own, which both halves have in common (`variance` in
+//! `scorer.json` states it).
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_10;
@@ -67,8 +67,8 @@ fn variance<'a>(blocks: impl Iterator<Item = &'a BlockNoise>, common: f64) -> f6
 }
 
 impl LightMse {
-    /// The error over the pixels of the mask and their channels; absent if no pixel counts. `blocks` holds the block of each
-    /// pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
+    /// The error over the pixels of the mask and their channels; absent if no pixel counts. `blocks` holds the block of
+    /// each pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
     pub fn new(difference: &LightDifference, mask: &Mask, blocks: &Picture<u64>) -> Result<Option<Self>, MetricError> {
         let LightDifference { halves: [first, second], noise: [u, v], .. } = difference;
         let (mut sum, mut values) = (0.0, 0_usize);
@@ -115,7 +115,8 @@ impl LightMse {
         self.mse < self.bounded()
     }
 
-    /// The PSNR of [`Self::bounded`]: it never rises with `mse`, nor jumps. It is exact where neither error nor noise is left.
+    /// The PSNR of [`Self::bounded`]: it never rises with `mse`, nor jumps. It is exact where neither error nor noise
+    /// is left.
     pub fn psnr(&self) -> Result<Psnr, MetricError> {
         Psnr::from_mse(self.bounded().max(0.0))
     }
@@ -123,9 +124,9 @@ impl LightMse {
 
 /// The standard error of the mean PSNR of several views, in dB; none without views.
 ///
-/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE; an exact view adds nothing, and a view whose error may be noise alone makes
-/// the whole mean one that nothing is stated of ([`ScoreSheet::state_noise`](crate::scene::ScoreSheet)). A block's effects on all views are summed before they are squared, so that correlation between views
-/// counts.
+/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE; an exact view adds nothing, and a view whose error may be noise
+/// alone makes the whole mean one that nothing is stated of ([`ScoreSheet::state_noise`](crate::scene::ScoreSheet)). A
+/// block's effects on all views are summed before they are squared, so that correlation between views counts.
 pub fn mean_psnr_error(views: &[LightMse]) -> Option<f64> {
     let (mut by_block, mut common): (BTreeMap<u64, BlockNoise>, f64) = Default::default();
     for view in views.iter().filter(|view| view.bounded() > 0.0) {
@@ -158,7 +159,8 @@ mod tests {
         LightMse::new(&difference, &mask, &blocks).unwrap()
     }
 
-    /// X Y = (0.125, 0.0625); Y u = (0.03125, 0), X v = (0.125, 0.03125), u v = (0.03125, 0). All sums are divided by 2.
+    /// X Y = (0.125, 0.0625); Y u = (0.03125, 0), X v = (0.125, 0.03125), u v = (0.03125, 0). All sums are divided by
+    /// 2.
     #[test]
     fn a_small_number_by_hand() {
         let found = error([true, true], [7, 3]).unwrap();
@@ -176,8 +178,8 @@ mod tests {
         assert_eq!(error([false, false], [7, 3]), None);
     }
 
-    /// Two equal views whose paths are the same have the error of one; of different blocks, 1/√2 of it. An error that all
-    /// have in common stays.
+    /// Two equal views whose paths are the same have the error of one; of different blocks, 1/√2 of it. An error that
+    /// all have in common stays.
     #[test]
     fn views_that_share_paths_are_not_independent() {
         let one = error([true, true], [1, 1]).unwrap();

@@ -1,10 +1,10 @@
 //! The paper's light: radiances fitted to the photo, and renders compared with those of the photo's renderer.
 //!
-//! A method's light is unknown, so the paper fits the radiances of a light stage (3D-FRONT) or of the scene's own emitters
-//! (Bitterli) until the predicted materials look like the photo. Light is linear in emission: one set of paths shows the
-//! input view under each light alone. Two independent streams of paths give two fits, one for each half of the render, so that
-//! the noise of the fit adds no bias to the squared error; the difference of the errors under either fit shows its noise.
-//! The truth is another renderer's picture, so nothing travels along and nothing is exact.
+//! A method's light is unknown, so the paper fits the radiances of a light stage (3D-FRONT) or of the scene's own
+//! emitters (Bitterli) until the predicted materials look like the photo. Light is linear in emission: one set of paths
+//! shows the input view under each light alone. Two independent streams of paths give two fits, one for each half of
+//! the render, so that the noise of the fit adds no bias to the squared error; the difference of the errors under
+//! either fit shows its noise. The truth is another renderer's picture, so nothing travels along and nothing is exact.
 
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
@@ -15,7 +15,8 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, encoded, guided_mean};
-use crate::light::predictions::{Each, EncodedReference, Guides, LitPicture, Paths, batches, picture_of};
+use crate::light::paths::{Paths, batches, picture_of};
+use crate::light::predictions::{Each, EncodedReference, Guides, LitPicture};
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
 use crate::truth::{ViewTruth, photo_of_renderer};

@@ -4,12 +4,12 @@ use std::fmt;
 use std::str::FromStr;
 
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
+use mateval_scene::by_text;
+use mateval_scene::word_enum::UnknownWord;
 use mateval_tracer::LightMix;
 use serde::{Deserialize, Serialize};
 
 use crate::protocol::RelitRules;
-use mateval_scene::by_text;
-use mateval_scene::word_enum::UnknownWord;
 
 /// The name of a lighting of track `relit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -82,9 +82,10 @@ pub fn lightings(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<RelitLighting> {
     lightings
 }
 
-/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its squared
-/// share of their luminance. With light samples divided in these proportions, the sum of the pictures' variances is least if
-/// the variance of a group's light follows the square of the light (Cochran, "Sampling techniques", section 5.5).
+/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its
+/// squared share of their luminance. With light samples divided in these proportions, the sum of the pictures'
+/// variances is least if the variance of a group's light follows the square of the light (Cochran, "Sampling
+/// techniques", section 5.5).
 pub(crate) fn group_shares(mixes: &[LightMix], sums: &[[f64; 3]]) -> Vec<f64> {
     let mut squares = vec![0.0; sums.len()];
     for mix in mixes {

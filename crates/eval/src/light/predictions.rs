@@ -1,29 +1,21 @@
 //! Predictions under the scene's own emitters, compared with R.
-//!
-//! Predictions that agree in roughness and metallic differ in base colour alone, on which no decision along a path depends:
-//! they share their paths. The truth can travel along, also where its roughness and metallic are others: directions then come
-//! from both densities in equal parts, and each of both is weighted by its own. A prediction's pictures are the same, bit for
-//! bit, whichever others are rendered with it.
-
-use std::collections::BTreeMap;
 
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::{Camera, Progress, Report, SceneId, TriangleMesh};
-use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
+use mateval_light::light_fit::FittedRadiances;
+use mateval_metrics::mask_rule::ReferenceFeatures;
+use mateval_scene::Camera;
 use mateval_tracer::noise_filter::Surfaces;
-use mateval_tracer::{Coat, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted};
+use mateval_tracer::{LightMix, ViewsRender, World};
 use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, ViewGuide, corrected_quarter, difference};
 use crate::light::lighting::{LightingName, group_shares, light_of, lightings};
+use crate::light::paths::{Paths, ViewQuarters, batches, picture_of};
 use crate::light::reference::{StoredReference, weighted};
-use crate::protocol::{LightRules, Protocol, Track};
+use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
 use crate::truth::{ViewTruth, true_maps};
-use mateval_light::light_fit::FittedRadiances;
-use mateval_metrics::mask_rule::ReferenceFeatures;
 
 /// A prediction under one light, compared with the reference.
 pub(crate) struct LitPicture<'a> {
@@ -56,9 +48,6 @@ impl EncodedReference {
 /// Passes a prediction's picture on, with its number.
 pub(crate) type Each<'a> = dyn FnMut(usize, LitPicture<'_>) -> Result<(), EvalError> + 'a;
 
-/// The four quarters of each view.
-pub(crate) type ViewQuarters = Vec<Vec<Picture<LinearRgb>>>;
-
 /// One lighting of the scene's own emitters.
 struct OwnLighting {
     track: Track,
@@ -69,8 +58,8 @@ struct OwnLighting {
     encoded: Vec<EncodedReference>,
 }
 
-/// Renders every submission together with the truth under the scene's own emitters, in every lighting of the protocol, and
-/// compares it with R.
+/// Renders every submission together with the truth under the scene's own emitters, in every lighting of the protocol,
+/// and compares it with R.
 pub(super) fn score_own(
     task: &SceneTask<'_>,
     reference: &StoredReference,
@@ -165,121 +154,6 @@ fn own_lightings(
         }
     }
     Ok((all, group_light))
-}
-
-/// The four independent renders of a prediction: both quarters of the first half, then of the second.
-pub(crate) const QUARTERS: [&str; 4] = ["a1", "a2", "b1", "b2"];
-
-/// The largest amount of memory that the pictures of one batch of predictions take, in bytes.
-const BATCH_BYTES: u64 = 850 << 20;
-
-/// A scene under some lights, whose paths have seeds of their own.
-pub(crate) struct Paths<'a> {
-    pub(crate) scene: &'a SceneId,
-    pub(crate) world: &'a World,
-    /// The meshes of `instances.glb`, one for each surface of the world.
-    pub(crate) atlases: &'a [TriangleMesh],
-    pub(crate) rules: &'a LightRules,
-    /// The name of the pass, part of the seeds.
-    pub(crate) pass: String,
-    pub(crate) progress: Progress<'a>,
-}
-
-impl Paths<'_> {
-    /// One stream of everything that travels: predictions, then the truth.
-    pub(crate) fn trace(
-        &self,
-        repaint: &Repaint,
-        lighting: Lighting<'_>,
-        cameras: &[Camera],
-        samples: u32,
-        stream: &str,
-    ) -> Result<Vec<ViewsRender>, EvalError> {
-        let what = format!("scene {}: {} light, {samples} samples, {stream}", self.scene, self.pass);
-        let seeds = [self.seed(stream)];
-        let settings = self.rules.settings(samples);
-        let shown = |done: usize, all: usize| (self.progress)(Report::step(&what, done, all));
-        let which = 0..repaint.predictions();
-        Ok(render_repainted(self.world, repaint, which, cameras, lighting, &settings, &seeds, &shown)?)
-    }
-
-    /// The quarters of the first `predictions` that travel, by prediction, light mix and view, and the number of contributions of
-    /// each that were not finite. Each half has `samples` per pixel, so a quarter has half of them. `picture` makes the picture
-    /// of (prediction, mix, view) from one stream's renders of everything that travels.
-    pub(crate) fn quarters(
-        &self,
-        repaint: &Repaint,
-        mixes: &[Vec<LightMix>],
-        cameras: &[Camera],
-        predictions: usize,
-        samples: u32,
-        picture: impl Fn(&[ViewsRender], usize, usize, usize) -> Picture<LinearRgb> + Sync,
-    ) -> Result<(Vec<Vec<ViewQuarters>>, Vec<u64>), EvalError> {
-        let mut quarters = vec![vec![vec![Vec::new(); cameras.len()]; mixes[0].len()]; predictions];
-        let mut not_finite = vec![0; predictions];
-        for stream in QUARTERS {
-            let renders = self.trace(repaint, Lighting::Mixed(mixes), cameras, (samples / 2).max(1), stream)?;
-            for (prediction, mixes) in quarters.iter_mut().enumerate() {
-                not_finite[prediction] += renders[prediction].stats.not_finite;
-                for (mix, views) in mixes.iter_mut().enumerate() {
-                    let views = views.par_iter_mut().enumerate();
-                    views.for_each(|(view, quarters)| quarters.push(picture(&renders, prediction, mix, view)));
-                }
-            }
-        }
-        Ok((quarters, not_finite))
-    }
-
-    /// The seed of one stream, the same for every prediction.
-    pub(crate) fn seed(&self, stream: &str) -> u64 {
-        let text = format!("{}/{}/{}/{stream}", self.rules.samples.seed, self.scene, self.pass);
-        u64::from_str_radix(&sha256_of_bytes(text.as_bytes())[..16], 16).expect("a hash is hexadecimal")
-    }
-
-    /// The materials that travel together. Predictions agree in roughness and metallic; those of the truth may be others.
-    pub(crate) fn repaint(
-        &self,
-        predictions: &[&PredictedScene],
-        truth: Option<&PredictedScene>,
-    ) -> Result<Repaint, EvalError> {
-        let all: Vec<&PredictedScene> = predictions.iter().copied().chain(truth).collect();
-        let first = all.first().expect("there is something to render");
-        let coat = |surface: usize| {
-            let PredictedMaterial { roughness, metallic, .. } = first.materials[surface].clone()?;
-            let base_colors = all.iter().map(|scene| Some(scene.materials[surface].as_ref()?.base_color.clone()));
-            Some(Coat { base_colors: base_colors.collect::<Option<_>>()?, roughness, metallic })
-        };
-        let coats: Vec<Option<Coat>> = (0..self.atlases.len()).map(coat).collect();
-        let repaint = Repaint::new(self.world, self.atlases, coats, self.rules.flavour)?;
-        match truth.filter(|truth| truth.scattering_key != first.scattering_key) {
-            None => Ok(repaint),
-            Some(truth) => {
-                let own = |material: &Option<PredictedMaterial>| {
-                    let PredictedMaterial { roughness, metallic, .. } = material.clone()?;
-                    Some(Scattering { roughness, metallic })
-                };
-                Ok(repaint.with_second(predictions.len(), truth.materials.iter().map(own).collect())?)
-            }
-        }
-    }
-}
-
-/// Predictions that share paths, by their numbers: those that agree in roughness and metallic, as many as the tracer takes at
-/// once beside `others` more and as fit in memory, where each takes `bytes`.
-pub(crate) fn batches(predictions: &[PredictedScene], others: usize, bytes: u64) -> Vec<Vec<usize>> {
-    let mut alike: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-    for (index, prediction) in predictions.iter().enumerate() {
-        alike.entry(&prediction.scattering_key).or_default().push(index);
-    }
-    let at_once = mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE - others;
-    let in_memory = (BATCH_BYTES / bytes.max(1)).saturating_sub(others as u64);
-    let most = at_once.min(in_memory.max(1) as usize);
-    alike.into_values().flat_map(|alike| alike.chunks(most).map(<[usize]>::to_vec).collect::<Vec<_>>()).collect()
-}
-
-/// A picture of one view. Every stream has one seed, so the tracer's list of halves holds one.
-pub(crate) fn picture_of(render: &ViewsRender, view: usize, picture: usize) -> &Picture<LinearRgb> {
-    &render.views[view].halves[0].basis.pictures()[picture]
 }
 
 /// What is known of each view of a prediction in one lighting.

@@ -1,8 +1,9 @@
 //! R, the reference under light: the scorer's own render of the true maps.
 //!
-//! It is made once a scene, from the bytes of `ground_truth/materials`, with the material and the rules of every prediction:
-//! for each view one picture a light group, linear, before exposure, in half floats, the mean of two independent halves. Any
-//! lighting of the scene is a weighted sum of them. It belongs to the dataset: the manifest lists its files.
+//! It is made once a scene, from the bytes of `ground_truth/materials`, with the material and the rules of every
+//! prediction: for each view one picture a light group, linear, before exposure, in half floats, the mean of two
+//! independent halves. Any lighting of the scene is a weighted sum of them. It belongs to the dataset: the manifest
+//! lists its files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,9 +23,9 @@ use mateval_tracer::{LightGroups, Lighting, World};
 
 use crate::error::EvalError;
 use crate::light::difference::encoded;
-use crate::light::predictions::Paths;
+use crate::light::paths::Paths;
+use crate::open_scene::{OpenScene, ViewSet};
 use crate::protocol::{LightRules, Protocol};
-use crate::scene::{OpenScene, ViewSet};
 use crate::truth::{check_sizes, true_maps};
 
 /// Rises whenever the pictures could change for the same inputs.
@@ -52,11 +53,11 @@ pub struct ReferenceReport {
     pub kept: usize,
 }
 
-/// Renders the references of a dataset's scenes into it. Scenes with a photo from elsewhere have none, since their light is
-/// not known. The manifest lists the pictures once the dataset is finished again (`prep finish`).
+/// Renders the references of a dataset's scenes into it. Scenes with a photo from elsewhere have none, since their
+/// light is not known. The manifest lists the pictures once the dataset is finished again (`prep finish`).
 ///
-/// References of the same files and samples are kept, so that a killed run resumes; all others are replaced. Several processes
-/// may work on different scenes at once.
+/// References of the same files and samples are kept, so that a killed run resumes; all others are replaced. Several
+/// processes may work on different scenes at once.
 pub fn make_references(
     root: &Path,
     options: &ReferenceOptions,
@@ -198,14 +199,15 @@ pub(crate) struct StoredReference {
 }
 
 impl StoredReference {
-    /// Like [`Self::check`], for numbers that carry the dataset's fingerprint: fails also where the manifest lists another.
+    /// Like [`Self::check`], for numbers that carry the dataset's fingerprint: fails also where the manifest lists
+    /// another.
     pub(crate) fn listed(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Self>, EvalError> {
         dataset.check_files(&scene.id, |file| file.ends_with(SCORER_JSON))?;
         Self::check(dataset, scene)
     }
 
-    /// The scene's reference; absent if it has none. Fails where it cannot be used: it was made by another version or from
-    /// other files, or a picture is missing or changed.
+    /// The scene's reference; absent if it has none. Fails where it cannot be used: it was made by another version or
+    /// from other files, or a picture is missing or changed.
     pub(crate) fn check(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Self>, EvalError> {
         let folder = dataset.folder(&scene.id).scorer();
         if !folder.exists() {
@@ -292,8 +294,8 @@ mod tests {
         dataset.scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap()
     }
 
-    /// The reference under weighted lights is what fresh paths show of the true maps under those weights. The twin: the same
-    /// lights, unweighted.
+    /// The reference under weighted lights is what fresh paths show of the true maps under those weights. The twin: the
+    /// same lights, unweighted.
     #[test]
     fn a_weighted_sum_is_a_render_under_those_lights() {
         let (dataset, scene) = (dataset(), room(dataset()));
@@ -331,8 +333,8 @@ mod tests {
         [0, 1, 2].map(|c| sum(c) / count)
     }
 
-    /// A reference that is cut off, edited, of another version or of other files is never used, and the error says how to make
-    /// it again.
+    /// A reference that is cut off, edited, of another version or of other files is never used, and the error says how
+    /// to make it again.
     #[test]
     fn what_cannot_be_trusted_is_named() {
         let root = kept_folder("stale_reference").join("dataset");

@@ -3,6 +3,7 @@
 use mateval_image::{Mask, Picture};
 use mateval_metrics::{MetricError, Psnr, flip};
 use mateval_scene::{Camera, SceneId};
+use mateval_tracer::shared_centre::noise_blocks;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
@@ -16,7 +17,6 @@ use crate::result::PictureValues;
 use crate::result::key::{Metric, PictureKind, Region, Surfaces, Views};
 use crate::scene::{BaseColors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::ViewTruth;
-use mateval_tracer::shared_centre::noise_blocks;
 
 /// Scores every submission under the lights of protocol number `at`.
 pub(crate) fn score_light(

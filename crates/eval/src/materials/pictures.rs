@@ -26,10 +26,10 @@ pub struct MaterialPictures {
 /// Red, green and blue of the base colour, roughness, metallic.
 type Values = [f32; 5];
 
-/// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a predicted
-/// material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's pictures: whether a
-/// few of them or all are looked at is decided by the world's own materials, for all submissions alike. Rays are traced once
-/// for all.
+/// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a
+/// predicted material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's
+/// pictures: whether a few of them or all are looked at is decided by the world's own materials, for all submissions
+/// alike. Rays are traced once for all.
 ///
 /// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces.
 pub fn material_pictures(

@@ -1,8 +1,9 @@
-//! The maps of submissions compared with the truth's in pictures, without light: the metrics of each region, of base colour also
-//! with its scale removed.
+//! The maps of submissions compared with the truth's in pictures, without light: the metrics of each region, of base
+//! colour also with its scale removed.
 
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::alignment::{channel_scales, scaled};
+use mateval_metrics::mask_rule::ReferenceFeatures;
 use mateval_metrics::{Lpips, MetricError, Psnr, delta_e, mse};
 use mateval_scene::Report;
 use mateval_scene::dataset::View;
@@ -17,7 +18,6 @@ use crate::result::PictureValues;
 use crate::result::key::{HALF_A_BYTE, Metric, PictureKind, Region, Surfaces, Views};
 use crate::scene::{BaseColors, InstanceErrors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::{ViewTruth, true_maps};
-use mateval_metrics::mask_rule::ReferenceFeatures;
 
 /// One submission's pictures of a view.
 struct Predicted {
@@ -47,8 +47,8 @@ struct Truth<'a> {
 type EachView<'a> = dyn FnMut(&View, usize, &[MaterialPictures], &Picture<LinearRgb>) -> Result<(), EvalError> + 'a;
 
 impl SceneTask<'_> {
-    /// Pictures of base colour, roughness and metallic, under the protocols that are `wanted` by their numbers. Returns the base
-    /// colours of the true atlases and of each submission.
+    /// Pictures of base colour, roughness and metallic, under the protocols that are `wanted` by their numbers. Returns
+    /// the base colours of the true atlases and of each submission.
     pub(crate) fn score_materials(
         &self,
         truths: &[ViewTruth],
@@ -105,8 +105,8 @@ impl SceneTask<'_> {
         Ok(base_colors)
     }
 
-    /// All metrics of a view's raw albedo, aligned albedo, roughness and metallic. The scale of the aligned albedo is fitted
-    /// over all valid pixels and is the same for every region.
+    /// All metrics of a view's raw albedo, aligned albedo, roughness and metallic. The scale of the aligned albedo is
+    /// fitted over all valid pixels and is the same for every region.
     fn material_values(
         &self,
         protocol: &Protocol,
@@ -221,8 +221,8 @@ impl AlbedoReference {
     }
 }
 
-/// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also SSIM, CIEDE2000 and (where its
-/// weights are loaded) LPIPS.
+/// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also SSIM, CIEDE2000 and
+/// (where its weights are loaded) LPIPS.
 pub fn measure_albedo(
     protocol: &Protocol,
     lpips: Option<&Lpips>,

@@ -4,8 +4,8 @@
 //!
 //! In: the baked truth of an instance, the maps of every submission. Out: [`InstanceTexelErrors`] for each submission.
 //!
-//! A [`TexelMap`], shared by all submissions, holds where each texel of the truth's atlas lies, how large it is and whether
-//! the input camera sees it. One instance is in memory at a time.
+//! A [`TexelMap`], shared by all submissions, holds where each texel of the truth's atlas lies, how large it is and
+//! whether the input camera sees it. One instance is in memory at a time.
 
 use std::path::Path;
 
@@ -22,8 +22,8 @@ use mateval_tracer::World;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
+use crate::pictures_dir::PicturesDir;
 use crate::result::{InstanceTexelErrors, TexelErrors};
-use crate::shown::PicturesDir;
 use crate::truth::true_material;
 
 /// Weighted squared errors over the observed, or the unobserved, texels of one or several instances.
@@ -50,8 +50,8 @@ impl TexelSums {
 
 /// Compares every instance that has an atlas, in the scene's order. Returns a list for each submission, in their order.
 ///
-/// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces and the scene's instances. Fails where
-/// the truth cannot be read or `scene.json` is unsound.
+/// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces and the scene's instances. Fails
+/// where the truth cannot be read or `scene.json` is unsound.
 pub fn texture_space(
     folder: &SceneFolder,
     scene: &SceneFile,
@@ -105,8 +105,8 @@ fn atlas_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>
 
 /// The squared errors of a prediction, weighted by area: of observed texels, then of unobserved ones.
 ///
-/// Both are looked up at the texels' places, bilinearly, whatever the prediction's size: at a centre the truth is its texel
-/// itself. Both are linear; nothing is clipped. The sums are the same for any number of threads.
+/// Both are looked up at the texels' places, bilinearly, whatever the prediction's size: at a centre the truth is its
+/// texel itself. Both are linear; nothing is clipped. The sums are the same for any number of threads.
 fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &PredictedMaterial) -> [TexelSums; 2] {
     let rows: Vec<[TexelSums; 2]> =
         (0..map.size()).into_par_iter().map(|y| compare_row(map, prediction, truth, y)).collect();
@@ -131,8 +131,8 @@ fn compare_row(map: &TexelMap, prediction: &PredictedMaterial, truth: &Predicted
     sums
 }
 
-/// Writes what the errors of an instance are computed from: for each texel of the atlas its area on the surface (0 off it), 1
-/// where the input view sees it, and the base colours of prediction and truth at its place.
+/// Writes what the errors of an instance are computed from: for each texel of the atlas its area on the surface (0 off
+/// it), 1 where the input view sees it, and the base colours of prediction and truth at its place.
 fn write_texels(path: &Path, map: &TexelMap, prediction: &Texture, truth: &Texture) -> Result<(), EvalError> {
     let size = map.size();
     let mut planes = vec![vec![0.0; size * size]; 8];
@@ -180,8 +180,8 @@ mod tests {
 
     use super::*;
 
-    /// Two triangles in one plane, all seen, of `areas` square metres. In the atlas they are alike, one in its left half and
-    /// one as far in its right half.
+    /// Two triangles in one plane, all seen, of `areas` square metres. In the atlas they are alike, one in its left
+    /// half and one as far in its right half.
     fn mesh(areas: [f32; 2]) -> TriangleMesh {
         let corners = |at: usize| {
             let side = (2.0 * areas[at]).sqrt();
@@ -237,7 +237,8 @@ mod tests {
         }
     }
 
-    /// The left triangle right, the right one a quarter off: half of the area, half of 1/16. At any size of the prediction.
+    /// The left triangle right, the right one a quarter off: half of the area, half of 1/16. At any size of the
+    /// prediction.
     #[test]
     fn half_of_the_area_wrong() {
         let [grey, white] = [0.5, 1.0].map(|value| greys(1, |_, _| value));
@@ -251,8 +252,8 @@ mod tests {
         }
     }
 
-    /// The right triangle has as many texels as the left one and three times its area. By hand: 3/4 of 0.2 squared, where
-    /// the mean over texels would be 1/2 of it.
+    /// The right triangle has as many texels as the left one and three times its area. By hand: 3/4 of 0.2 squared,
+    /// where the mean over texels would be 1/2 of it.
     #[test]
     fn area_is_what_counts() {
         let zero = greys(1, |_, _| 0.0);

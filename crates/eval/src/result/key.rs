@@ -1,5 +1,5 @@
-//! The keys of a result, as in `rgb_true_specular.novel.psnr`: the one place that prints and parses them, with the metrics,
-//! which direction of them is better, and how they are displayed.
+//! The keys of a result, as in `rgb_true_specular.novel.psnr`: the one place that prints and parses them, with the
+//! metrics, which direction of them is better, and how they are displayed.
 
 use std::cmp::Ordering;
 use std::fmt;

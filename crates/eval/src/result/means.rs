@@ -8,8 +8,8 @@ use mateval_scene::SceneId;
 use crate::result::key::{Metric, PictureKind, ResultKey, Views};
 use crate::result::{InstanceTexelErrors, PictureValues};
 
-/// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over its
-/// scenes. A mean skips missing values; the dataset's mean of a key skips scenes without a value of that key.
+/// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over
+/// its scenes. A mean skips missing values; the dataset's mean of a key skips scenes without a value of that key.
 pub fn means(
     pictures: &[PictureValues],
     texels: &[InstanceTexelErrors],

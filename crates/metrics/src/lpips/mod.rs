@@ -115,8 +115,9 @@ impl Lpips {
         self.filled_distance(prediction, reference, mask, || StageWeights::inside(&self.network, mask))
     }
 
-    /// The weighted distance of the reference from itself with the prediction's pixels inside the mask. The networks run
-    /// over those parts of the picture alone that these pixels change and the weights count. `None` where no pixel counts.
+    /// The weighted distance of the reference from itself with the prediction's pixels inside the mask. The networks
+    /// run over those parts of the picture alone that these pixels change and the weights count. `None` where no pixel
+    /// counts.
     fn filled_distance(
         &self,
         prediction: &Picture<SrgbRgb>,
@@ -196,8 +197,8 @@ impl StageWeights {
         network::stage_sizes(network, picture).into_iter().map(even).collect()
     }
 
-    /// For the mean over the mask of the stages' maps, each enlarged bilinearly to the picture's size. The enlarged maps
-    /// are not computed: their sum is a weighted sum of the stage's values.
+    /// For the mean over the mask of the stages' maps, each enlarged bilinearly to the picture's size. The enlarged
+    /// maps are not computed: their sum is a weighted sum of the stage's values.
     fn inside(network: &Network, mask: &Mask) -> Vec<Self> {
         let picture = (mask.width(), mask.height());
         network::stage_sizes(network, picture).into_iter().map(|size| Self::enlarged(size, mask)).collect()
@@ -253,8 +254,8 @@ struct Place {
     share: f64,
 }
 
-/// The places of `to` samples interpolated linearly between `from`, with pixel centres at one half and the ends continued
-/// (torch's `bilinear` with `align_corners=False`).
+/// The places of `to` samples interpolated linearly between `from`, with pixel centres at one half and the ends
+/// continued (torch's `bilinear` with `align_corners=False`).
 fn enlarged_places(from: usize, to: usize) -> Vec<Place> {
     let place = |target: usize| {
         let position = ((target as f64 + 0.5) * from as f64 / to as f64 - 0.5).max(0.0);
@@ -404,8 +405,8 @@ mod tests {
         assert_eq!(with(1), with(4));
     }
 
-    /// The mean over the mask of the enlarged maps, by its definition: every response computed, every map enlarged pixel by
-    /// pixel. `counts` are the pixels that are summed; `mask` fills the prediction.
+    /// The mean over the mask of the enlarged maps, by its definition: every response computed, every map enlarged
+    /// pixel by pixel. `counts` are the pixels that are summed; `mask` fills the prediction.
     fn masked_by_definition(
         lpips: &Lpips,
         prediction: &Picture<SrgbRgb>,
@@ -443,8 +444,8 @@ mod tests {
         sum / pixel_count(mask) as f64
     }
 
-    /// Masks of one block, of two, of scattered pixels, of everything. Summed over the whole picture instead, what spills out
-    /// of the mask is noticed.
+    /// Masks of one block, of two, of scattered pixels, of everything. Summed over the whole picture instead, what
+    /// spills out of the mask is noticed.
     #[test]
     fn inside_a_mask_by_its_definition() {
         let (lpips, p, r) = (tiny(), noise(40, 34, 40), noise(40, 34, 41));
@@ -537,7 +538,8 @@ mod tests {
         }
     }
 
-    /// Two samples enlarged to four lie at 0, 0.25, 0.75 and 1. A sample that no pixel of the mask looks at has no weight.
+    /// Two samples enlarged to four lie at 0, 0.25, 0.75 and 1. A sample that no pixel of the mask looks at has no
+    /// weight.
     #[test]
     fn counts_inside_a_mask() {
         assert_eq!(counts(2, 4, 1), [1.0, 0.0]);

@@ -281,8 +281,9 @@ pub(crate) fn check_size(net: Net, network: &Network, size: Size) -> Result<(), 
     Err(MetricError::TooSmall { metric: net.key(), least: net.least_side(), found: size })
 }
 
-/// The responses to a picture that differs from that of `base` in some pixels. For each stage also the pixels, by index,
-/// that were computed: those that the difference reaches, as far as they are `needed`. All others are those of `base`.
+/// The responses to a picture that differs from that of `base` in some pixels. For each stage also the pixels, by
+/// index, that were computed: those that the difference reaches, as far as they are `needed`. All others are those of
+/// `base`.
 pub(crate) fn compute_changed(
     network: &Network,
     input: &Tensor,

@@ -1,9 +1,9 @@
-//! The layers of a network: values at the pixels of a grid, convolutions with the rectifier after them, and max pooling, each
-//! for the pixels that are asked for alone.
+//! The layers of a network: values at the pixels of a grid, convolutions with the rectifier after them, and max
+//! pooling, each for the pixels that are asked for alone.
 //!
-//! A convolution is a matrix product: each output pixel's patch of the input becomes a row of a matrix ("im2col"), which is
-//! multiplied with the weights. A thread holds only [`BLOCK_PIXELS`] rows at a time. Blocks, and so the order of every sum, do
-//! not depend on the number of threads.
+//! A convolution is a matrix product: each output pixel's patch of the input becomes a row of a matrix ("im2col"),
+//! which is multiplied with the weights. A thread holds only [`BLOCK_PIXELS`] rows at a time. Blocks, and so the order
+//! of every sum, do not depend on the number of threads.
 
 use rayon::prelude::*;
 

@@ -56,7 +56,8 @@ impl AtlasCache {
         Self { folder: folder.to_owned(), makers_sha256, remarks: Mutex::default() }
     }
 
-    /// Removes what was not used for longest until the cache is small enough, and returns every fault since the last call.
+    /// Removes what was not used for longest until the cache is small enough, and returns every fault since the last
+    /// call.
     pub fn finish(&self) -> Vec<String> {
         if self.folder.is_dir()
             && let Err(error) = keep_below(&self.folder, MOST_BYTES)

@@ -1,8 +1,8 @@
 //! Unwraps meshes into uv atlases without overlaps.
 //!
-//! In: a shape, and its copies in a scene, each with a wanted size. Out: each copy with its atlas. Between: [`cache`] knows
-//! the layouts of earlier builds; where it does not, `packing` cuts the shape into charts and packs them. A layout is
-//! apart from the shape's place in a scene, and is carried to the copies.
+//! In: a shape, and its copies in a scene, each with a wanted size. Out: each copy with its atlas. Between: [`cache`]
+//! knows the layouts of earlier builds; where it does not, `packing` cuts the shape into charts and packs them. A
+//! layout is apart from the shape's place in a scene, and is carried to the copies.
 
 pub mod cache;
 mod packing;
@@ -24,8 +24,8 @@ pub fn unwrap(mesh: &TriangleMesh, size: SizeWish) -> Result<Unwrapped, AtlasErr
     unwrap_copies(mesh, &[Wanted { mesh, size }], None).remove(0)
 }
 
-/// Unwraps copies of a shape: meshes with its triangles and the same lengths, which may stand anywhere. A layout is made
-/// only where the cache does not hold it.
+/// Unwraps copies of a shape: meshes with its triangles and the same lengths, which may stand anywhere. A layout is
+/// made only where the cache does not hold it.
 pub fn unwrap_copies(
     shape: &TriangleMesh,
     copies: &[Wanted<'_>],

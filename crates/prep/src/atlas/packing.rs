@@ -187,8 +187,8 @@ fn pack_kept(mesh: &TriangleMesh, size: u32, is_kept: impl Fn(usize) -> bool) ->
     Ok(layout)
 }
 
-/// Moves vertices without a chart, those of triangles whose area is negligible, to the first vertex that has one. Counts
-/// the triangles whose corners are at one point.
+/// Moves vertices without a chart, those of triangles whose area is negligible, to the first vertex that has one.
+/// Counts the triangles whose corners are at one point.
 fn place_unmapped(layout: &mut AtlasLayout, has_chart: &[bool]) {
     let first = has_chart.iter().position(|has| *has).map_or([0.0, 1.0], |vertex| layout.uvs[vertex]);
     for (vertex, _) in has_chart.iter().enumerate().filter(|(_, has)| !**has) {
@@ -201,8 +201,8 @@ fn place_unmapped(layout: &mut AtlasLayout, has_chart: &[bool]) {
     layout.unmapped = layout.triangles.iter().filter(at_one_place).count();
 }
 
-/// The charts of a shape, packed into a square. It holds for every mesh with the same triangles whose sides have the same
-/// lengths, wherever it stands.
+/// The charts of a shape, packed into a square. It holds for every mesh with the same triangles whose sides have the
+/// same lengths, wherever it stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct AtlasLayout {
     /// Texels a side.
@@ -230,8 +230,8 @@ pub struct Unwrapped {
     pub coverage: f64,
     /// Length of a texel's side on the surface in metres, averaged over the area.
     pub texel_m: f64,
-    /// Number of triangles without a chart, since their area is negligible. All three corners of each lie on one point of
-    /// another chart.
+    /// Number of triangles without a chart, since their area is negligible. All three corners of each lie on one point
+    /// of another chart.
     pub unmapped: usize,
 }
 

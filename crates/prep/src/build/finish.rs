@@ -1,12 +1,12 @@
 //! Writes the files that describe a whole dataset, once its scenes are made.
 //!
-//! These are `dataset.json`, `targets.json`, the recipe and the manifest. Files of scenes are not read again where their
-//! hashes are known.
+//! These are `dataset.json`, `targets.json`, the recipe and the manifest. Files of scenes are not read again where
+//! their hashes are known.
 //!
-//! [`bring_up_to_date`] does so for a dataset of the format before this one, from what it holds. `mateval/3` differs from
-//! `mateval/2` in the word of its JSON files, in a key of `dataset.json` and in the pictures that scores under light are
-//! computed from. These are made by the caller; everything else happens here, and no other file changes. A run that was
-//! killed resumes.
+//! [`bring_up_to_date`] does so for a dataset of the format before this one, from what it holds. `mateval/3` differs
+//! from `mateval/2` in the word of its JSON files, in a key of `dataset.json` and in the pictures that scores under
+//! light are computed from. These are made by the caller; everything else happens here, and no other file changes. A
+//! run that was killed resumes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -38,10 +38,10 @@ enum CutOffRenders {
     Listed,
 }
 
-/// Finishes the dataset that `prep build` makes in `root`, without the scenes `without`, which are put aside in `.build`
-/// until a later call wants them. Fails where another process works on the dataset, where a scene is not made, where one
-/// was changed by anything but `prep`, or where a folder is none of the recipe's scenes; everything of one kind is named
-/// at once. Of a dataset that was not built here, the list of scenes stays as it is.
+/// Finishes the dataset that `prep build` makes in `root`, without the scenes `without`, which are put aside in
+/// `.build` until a later call wants them. Fails where another process works on the dataset, where a scene is not made,
+/// where one was changed by anything but `prep`, or where a folder is none of the recipe's scenes; everything of one
+/// kind is named at once. Of a dataset that was not built here, the list of scenes stays as it is.
 pub fn finish(root: &Path, without: &[SceneId], tool: &str, progress: Progress<'_>) -> Result<DatasetFile, PrepError> {
     finish_with(root, without, CutOffRenders::Refused, tool, progress)
 }
@@ -260,8 +260,8 @@ fn write(root: &Path, mut dataset: DatasetFile, known: &BTreeMap<String, String>
 }
 
 /// Rewrites the dataset in `root` from [`PREVIOUS_FORMAT`] to [`FORMAT`] and renews its manifest; pictures, meshes and
-/// textures keep their bytes. Returns whether there was anything to do. Fails, before anything of a scene is written, where
-/// one of its files is not the one that is listed.
+/// textures keep their bytes. Returns whether there was anything to do. Fails, before anything of a scene is written,
+/// where one of its files is not the one that is listed.
 pub fn bring_up_to_date(root: &Path, progress: Progress<'_>) -> Result<bool, PrepError> {
     let path = root.join(DATASET);
     let bytes = std::fs::read(&path).map_err(PrepError::io("read", &path))?;
@@ -282,8 +282,8 @@ pub fn bring_up_to_date(root: &Path, progress: Progress<'_>) -> Result<bool, Pre
     Ok(true)
 }
 
-/// Fails where scenes are missing, where the geometry is not the true one, or where a file outside of scenes is not the one
-/// that the manifest lists. Those of scenes are checked scene by scene.
+/// Fails where scenes are missing, where the geometry is not the true one, or where a file outside of scenes is not the
+/// one that the manifest lists. Those of scenes are checked scene by scene.
 fn check_can_change(root: &Path, dataset: &DatasetFile) -> Result<(), PrepError> {
     check_whole(root, dataset)?;
     if dataset.geometry.is_some() {

@@ -106,8 +106,8 @@ fn copies_of_shapes(plan: &Plan) -> Vec<Vec<usize>> {
     shapes
 }
 
-/// The wanted size of an instance's atlas, and half a pixel of the input view at its depth in metres. An instance that no
-/// view shows gets the least size.
+/// The wanted size of an instance's atlas, and half a pixel of the input view at its depth in metres. An instance that
+/// no view shows gets the least size.
 fn wish(plan: &Plan, sizes: &AtlasSizes<'_>, at: usize) -> (SizeWish, Option<f64>) {
     let focal = plan.views[0].camera.intrinsics.fx;
     let half_pixel_m = sizes.nearest[at].map(|depth| 0.5 * depth / focal);
@@ -336,8 +336,8 @@ fn texels_per_uv_unit(material: &Material, textures: &[Texture]) -> DVec2 {
     })
 }
 
-/// The number of lookups along a texel's side, over which the source's uv changes by `step`, for which neighbouring lookups
-/// are half a source texel apart or nearer.
+/// The number of lookups along a texel's side, over which the source's uv changes by `step`, for which neighbouring
+/// lookups are half a source texel apart or nearer.
 fn lookups_along(step: Vec2, source_texels: DVec2) -> usize {
     let texels = step.as_dvec2().abs().dot(source_texels);
     // A sliver's steps may overflow.
@@ -437,8 +437,8 @@ mod tests {
         assert_mean_grey(256, 256, |x, y| (x + y) % 2 == 1);
     }
 
-    /// Stripes that are fine along u and absent along v. As many lookups along both sides as their mean asks for would miss
-    /// them.
+    /// Stripes that are fine along u and absent along v. As many lookups along both sides as their mean asks for would
+    /// miss them.
     #[test]
     fn stretched_textures_are_filtered_along_both_sides() {
         assert_mean_grey(512, 8, |x, _| x % 2 == 1);

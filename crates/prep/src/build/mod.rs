@@ -1,10 +1,10 @@
 //! Makes the dataset of a recipe scene by scene, each completely or not at all. A run that was killed is resumed.
 //!
-//! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source` reads
-//! the source with its photo and chooses the input camera; `plan` numbers instances and parts ([`parts`]), converts the
-//! materials and places the views; `pictures` writes what each view shows and refuses scenes that would become a wrong
-//! truth; [`materials`] unwraps every instance and bakes its material; meshes and `scene.json` are written here. [`finish`]
-//! writes the files of the whole dataset. [`fault`] lists why a scene is refused.
+//! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
+//! reads the source with its photo and chooses the input camera; `plan` numbers instances and parts ([`parts`]),
+//! converts the materials and places the views; `pictures` writes what each view shows and refuses scenes that would
+//! become a wrong truth; [`materials`] unwraps every instance and bakes its material; meshes and `scene.json` are
+//! written here. [`finish`] writes the files of the whole dataset. [`fault`] lists why a scene is refused.
 
 pub mod fault;
 pub mod finish;
@@ -132,9 +132,9 @@ fn make_scene(
     Ok(json::write(&mark, &made)?)
 }
 
-/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases are
-/// taken from the cache where it holds them. Returns what the folder does not hold: the licence that came with the source,
-/// and the files that were looked for but do not exist, with paths as in `scene.json`; sorted.
+/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases
+/// are taken from the cache where it holds them. Returns what the folder does not hold: the licence that came with the
+/// source, and the files that were looked for but do not exist, with paths as in `scene.json`; sorted.
 fn build_scene(
     recipe: &Recipe,
     entry: &RecipeScene,

@@ -1,10 +1,10 @@
 //! The instances of a scene and their parts: ids, roles, categories, and the numbers that pictures hold in 16 bits.
 //!
 //! The source states parts of its own, or they are the connected pieces of a mesh. Labels from another program, such as
-//! PartField, are a further split: a folder with files `<instance>.npy`, NumPy arrays of one integer for each triangle, in
-//! the order of `instances.glb`. Each label of an instance is a part, whether its triangles are connected or not. An
-//! instance without a file keeps the source's own parts, which is a finding. A file that does not fit its instance is an
-//! error.
+//! PartField, are a further split: a folder with files `<instance>.npy`, NumPy arrays of one integer for each triangle,
+//! in the order of `instances.glb`. Each label of an instance is a part, whether its triangles are connected or not. An
+//! instance without a file keeps the source's own parts, which is a finding. A file that does not fit its instance is
+//! an error.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU16;
@@ -113,8 +113,8 @@ impl PartSplit {
         Self::new(None, instances, scene.surfaces.iter().zip(origins).map(of_triangle).collect())
     }
 
-    /// Numbers the parts from 1 in the order of the instances. `of_triangles` holds for each instance the part (0, 1, ...)
-    /// of each of its triangles.
+    /// Numbers the parts from 1 in the order of the instances. `of_triangles` holds for each instance the part (0, 1,
+    /// ...) of each of its triangles.
     pub fn new(
         id: Option<PartSetId>,
         instances: &[InstanceEntry],
@@ -255,7 +255,8 @@ fn unlabelled(id: &PartSetId, instance: &InstanceEntry, folder: &str) -> Finding
     }
 }
 
-/// A finding that names the files of the folder that match no instance, as those of another scene or with a mistyped name.
+/// A finding that names the files of the folder that match no instance, as those of another scene or with a mistyped
+/// name.
 fn unused(
     id: &PartSetId,
     labels: &str,
@@ -354,7 +355,8 @@ mod tests {
         assert_eq!(parts, (1..=10).collect::<Vec<u16>>());
     }
 
-    /// In a whole house the ids of instances and parts are unique, and every instance has the parts that its source states.
+    /// In a whole house the ids of instances and parts are unique, and every instance has the parts that its source
+    /// states.
     #[test]
     fn ids_of_a_whole_house_are_unique() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! Writes the pictures of every view of a scene, and refuses scenes that would be built into a wrong truth.
 //!
-//! These are scenes in which much of the source is missing, base colours are not stated, or no light reaches the picture.
-//! The recipe may allow the first two.
+//! These are scenes in which much of the source is missing, base colours are not stated, or no light reaches the
+//! picture. The recipe may allow the first two.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -168,10 +168,10 @@ pub(super) fn check_missing(
     }))
 }
 
-/// A folder below `root`, or `root` itself, in which the missing file exists: by its whole path, or else by its own folder
-/// and name. A path of at most two parts is also found by its name, unless several folders hold such a name. `models` is
-/// the folder of a 3D-FRONT room's models, which all have the same names in folders of their own. Absent if the file is
-/// where it was looked for.
+/// A folder below `root`, or `root` itself, in which the missing file exists: by its whole path, or else by its own
+/// folder and name. A path of at most two parts is also found by its name, unless several folders hold such a name.
+/// `models` is the folder of a 3D-FRONT room's models, which all have the same names in folders of their own. Absent if
+/// the file is where it was looked for.
 fn folder_of(root: &Path, missing: &str, models: Option<&Path>) -> Option<PathBuf> {
     let parts: Vec<&str> = missing.split('/').filter(|part| !matches!(*part, "" | "." | "..")).collect();
     if parts.is_empty() || root.join(missing).is_file() {

@@ -195,8 +195,8 @@ const LEAST_VALID: f64 = 0.5;
 /// By how much more of the picture than the input view's may see nothing of the scene.
 const MORE_OUTSIDE: f64 = 0.02;
 
-/// The wide views of a scene with the input camera `input`, and a finding for each that has no free place. `file` is the
-/// one that findings refer to. `scored` states for each surface whether it is scored.
+/// The wide views of a scene with the input camera `input`, and a finding for each that has no free place. `file` is
+/// the one that findings refer to. `scored` states for each surface whether it is scored.
 fn wide_views(
     wide: &WideViews,
     world: &World,
@@ -273,8 +273,8 @@ fn looked_at(world: &World, input: &Camera) -> Option<DVec3> {
     Some(input.unproject(DVec2::new(input.intrinsics.cx, input.intrinsics.cy), depth))
 }
 
-/// A camera at `place` that looks at `target`; none where it would look straight up or down. What the input view does not
-/// see is counted when its pictures are made.
+/// A camera at `place` that looks at `target`; none where it would look straight up or down. What the input view does
+/// not see is counted when its pictures are made.
 fn looking_at(id: ViewId, place: DVec3, target: DVec3, input: &Camera) -> Option<View> {
     let camera = Camera::look_at(place, target, DVec3::Y, input.intrinsics)?;
     let distance_m = place.distance(input.position());
@@ -331,7 +331,8 @@ impl<'a> Judge<'a> {
         best.map(|(_, place)| place)
     }
 
-    /// The share of the valid pixels that the input view does not show; none where a rule is broken, the cheapest first.
+    /// The share of the valid pixels that the input view does not show; none where a rule is broken, the cheapest
+    /// first.
     fn unseen_from(&self, place: DVec3) -> Option<f64> {
         let way = place - self.input.position();
         let ray = Ray::endless(self.input.position().as_vec3(), way.normalize().as_vec3());

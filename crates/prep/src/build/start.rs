@@ -209,9 +209,9 @@ fn check_place(options: &BuildOptions, place: Place) -> Result<(), PrepError> {
     }
 }
 
-/// Fails where scenes that are to be made were made otherwise than the recipe says, or scenes are not in it and all are to
-/// be made: of the others, `prep finish` says so. Scenes of a build that never finished are made again where only their
-/// files have changed: nobody can have rendered them.
+/// Fails where scenes that are to be made were made otherwise than the recipe says, or scenes are not in it and all are
+/// to be made: of the others, `prep finish` says so. Scenes of a build that never finished are made again where only
+/// their files have changed: nobody can have rendered them.
 fn check_scenes(options: &BuildOptions, recipe: &Recipe, tool: &str, source: &Path) -> Result<(), PrepError> {
     let build = BuildFolder::of(&options.out);
     let is_finished = options.out.join(DATASET).is_file();

@@ -1,7 +1,7 @@
 //! The base colour with which the scored model reflects the same share of uniform light as a source material.
 //!
-//! The rule is measured once for each kind of material, and applied to colours and to textures, each of which is derived
-//! once from a texture of the source.
+//! The rule is measured once for each kind of material, and applied to colours and to textures, each of which is
+//! derived once from a texture of the source.
 
 use std::collections::BTreeMap;
 

@@ -1,11 +1,11 @@
 //! Converts a source's materials to the model that is scored: base colour, roughness, metallic, and nothing else.
 //!
-//! In: a scene with its source's materials. Out: the same scene whose materials are Blender's principled with a `specular`
-//! of 0.5, two-sided and without bump maps, as every prediction is rendered; and the source's own materials, for whoever
-//! wants the author's picture. Glass keeps its model; opacities and lights stay as they are.
+//! In: a scene with its source's materials. Out: the same scene whose materials are Blender's principled with a
+//! `specular` of 0.5, two-sided and without bump maps, as every prediction is rendered; and the source's own materials,
+//! for whoever wants the author's picture. Glass keeps its model; opacities and lights stay as they are.
 //!
-//! One rule gives every base colour: the converted material reflects the same share of uniform light as its source, channel
-//! by channel. `base_color` holds the rule and applies it to textures.
+//! One rule gives every base colour: the converted material reflects the same share of uniform light as its source,
+//! channel by channel. `base_color` holds the rule and applies it to textures.
 
 mod base_color;
 
@@ -161,8 +161,8 @@ impl Converter<'_> {
         Ok(Some(model))
     }
 
-    /// The rule for models that differ only in their colour, which `even` makes; `roughness` and `metallic` are those of
-    /// the converted material.
+    /// The rule for models that differ only in their colour, which `even` makes; `roughness` and `metallic` are those
+    /// of the converted material.
     fn rule(
         &mut self,
         even: impl Fn(ColorInput) -> MaterialModel,
@@ -316,7 +316,8 @@ mod tests {
         assert!(worst_of_twin > 0.2, "{worst_of_twin}");
     }
 
-    /// A dark plastic with more reflection than the scored model's is brighter by a base; with less it keeps its textures.
+    /// A dark plastic with more reflection than the scored model's is brighter by a base; with less it keeps its
+    /// textures.
     #[test]
     fn dark_plastic() {
         for eta in [1.3, 1.5, 1.9] {

@@ -2,8 +2,8 @@
 //!
 //! The input is a dataset with its ground truth. The output is a dataset without ground truth, from which methods make
 //! submissions that are scored on the true one. Topology, atlases and the photo stay; `motion` moves the vertices of
-//! furniture by the amount of a level and finds furniture that passes through walls. Meshes, `scene.json` and the pictures
-//! of geometry are written again.
+//! furniture by the amount of a level and finds furniture that passes through walls. Meshes, `scene.json` and the
+//! pictures of geometry are written again.
 
 mod motion;
 

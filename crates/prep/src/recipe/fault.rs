@@ -6,8 +6,8 @@ use mateval_scene::findings::shortened;
 use mateval_scene::{PartSetId, SceneError, SceneId, ViewId};
 use mateval_sources::below::BelowError;
 
-/// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers are
-/// centimetres apart.
+/// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers
+/// are centimetres apart.
 pub(super) const FARTHEST_M: f64 = 1e6;
 /// Least and most pixels of a picture's side.
 pub(crate) const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;

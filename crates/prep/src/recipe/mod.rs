@@ -155,7 +155,8 @@ pub enum WideViews {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawnViews {
     pub count: u32,
-    /// The distances of the first and the last from the input camera, in metres; those of the others lie evenly in between.
+    /// The distances of the first and the last from the input camera, in metres; those of the others lie evenly in
+    /// between.
     pub distance_m: [f64; 2],
     pub seed: u64,
 }

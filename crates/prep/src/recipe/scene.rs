@@ -35,8 +35,8 @@ pub struct RecipeScene {
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
     pub part_labels: BTreeMap<PartSetId, PathBuf>,
-    /// SHA-256 of every file that the scene is made of, by its path as `scene.json` lists it under `source`. If any other
-    /// byte is read, the scene is refused. Not checked if empty.
+    /// SHA-256 of every file that the scene is made of, by its path as `scene.json` lists it under `source`. If any
+    /// other byte is read, the scene is refused. Not checked if empty.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
     /// Accept a scene that lacks more than a fifth of its models, meshes or textures.

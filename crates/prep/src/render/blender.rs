@@ -22,8 +22,8 @@ use crate::blender::{
 use crate::error::PrepError;
 use crate::scene_meshes;
 
-/// Folder of the jobs while they are rendered, inside the dataset's folder. Names that start with a dot do not belong to a
-/// dataset.
+/// Folder of the jobs while they are rendered, inside the dataset's folder. Names that start with a dot do not belong
+/// to a dataset.
 const WORK: &str = ".render";
 /// How much of the end of a log a finding quotes, in bytes.
 const TAIL_BYTES: u64 = 1500;
@@ -52,8 +52,8 @@ impl BlenderOptions {
     }
 }
 
-/// Renders the scenes, `options.jobs` at a time. A scene that fails becomes a failure in the report and does not stop the
-/// others.
+/// Renders the scenes, `options.jobs` at a time. A scene that fails becomes a failure in the report and does not stop
+/// the others.
 pub(super) fn render_scenes(
     run: &RenderRun<'_>,
     options: &BlenderOptions,

@@ -87,12 +87,12 @@ impl Renderer {
 const UNFINISHED: &str = "lacks MANIFEST.sha256 or dataset.json: its build did not finish; run `prep build` again, or \
          `prep finish` where all scenes are made";
 
-/// Renders the dataset in `root`. Where no scenes are chosen, it then names the photo renderer and writes a new manifest;
-/// otherwise [`crate::build::finish`] does so, and several processes may render different scenes at once.
+/// Renders the dataset in `root`. Where no scenes are chosen, it then names the photo renderer and writes a new
+/// manifest; otherwise [`crate::build::finish`] does so, and several processes may render different scenes at once.
 ///
 /// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
-/// cannot render becomes a failure in the report; the others are still rendered. Scenes with a photo from elsewhere are not
-/// rendered, and a remark names each.
+/// cannot render becomes a failure in the report; the others are still rendered. Scenes with a photo from elsewhere are
+/// not rendered, and a remark names each.
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let build_recipe = is_build(root).then(|| BuildFolder::of(root).recipe());
     if build_recipe.is_some() && !root.join(DATASET).is_file() {

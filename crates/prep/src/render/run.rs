@@ -136,7 +136,8 @@ impl RenderRun<'_> {
     }
 }
 
-/// The seed of one half of a view's picture. The two halves must not share a sequence: their errors would be correlated.
+/// The seed of one half of a view's picture. The two halves must not share a sequence: their errors would be
+/// correlated.
 pub(super) fn seed(scene: &SceneId, view: &View, half: usize) -> u64 {
     let text = sha256_of_bytes(format!("{scene}/{}/{half}", view.id).as_bytes());
     u64::from_str_radix(&text[..16], 16).expect("a hash is hexadecimal")

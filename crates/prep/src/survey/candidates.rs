@@ -158,8 +158,8 @@ impl RoomSearch<'_> {
         ids.into_iter().chain(jids).filter_map(|id| lists.reason(id)).collect()
     }
 
-    /// The drawn cameras and the designers' cameras in this room that break no rule, the best score first; and the others
-    /// with the rules that they break.
+    /// The drawn cameras and the designers' cameras in this room that break no rule, the best score first; and the
+    /// others with the rules that they break.
     fn cameras(&self, room: usize) -> (Vec<Candidate>, Vec<RefusedCamera>) {
         let (posed, mut refused) = self.draws.posed(room);
         let mut found = Vec::new();

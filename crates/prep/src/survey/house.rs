@@ -1,8 +1,8 @@
 //! Searches the houses one by one, and keeps what was found in each.
 //!
-//! What was found in a house is kept in `.survey`, so that the house need not be searched again where a survey is resumed,
-//! and so that several processes can search different houses. `survey.json` is written last: a folder without it holds a
-//! survey that is not finished.
+//! What was found in a house is kept in `.survey`, so that the house need not be searched again where a survey is
+//! resumed, and so that several processes can search different houses. `survey.json` is written last: a folder without
+//! it holds a survey that is not finished.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -167,8 +167,8 @@ struct WorkKey {
 pub(super) struct SurveyFolder(PathBuf);
 
 impl SurveyFolder {
-    /// Begins a survey in the folder, or resumes one. Fails where it holds something else, or a finished survey that may
-    /// not be replaced.
+    /// Begins a survey in the folder, or resumes one. Fails where it holds something else, or a finished survey that
+    /// may not be replaced.
     pub(super) fn begin(out: &Path, force: bool) -> Result<Self, PrepError> {
         let folder = Self(out.to_owned());
         folder.check_place(force)?;

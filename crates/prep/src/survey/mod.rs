@@ -1,9 +1,9 @@
 //! Searches houses for rooms that could become scenes, and chooses scenes among them.
 //!
 //! In: houses, models, textures, rules, lists. Out: a folder with [`SurveyFile`], which lists every room, why it was
-//! rejected or which cameras it offers; thumbnails; an HTML page to pick from; and a recipe that pins the SHA-256 of every
-//! input. Rooms and cameras depend on the houses and the seed alone, whether all houses are searched at once, by a run that
-//! was resumed, or by several processes.
+//! rejected or which cameras it offers; thumbnails; an HTML page to pick from; and a recipe that pins the SHA-256 of
+//! every input. Rooms and cameras depend on the houses and the seed alone, whether all houses are searched at once, by
+//! a run that was resumed, or by several processes.
 //!
 //! Between: here the houses are found. `house` searches each of them or takes what an earlier run has found there:
 //! [`rules`] state what a room must be like, [`intersect`] measures furniture that stands in other furniture,

@@ -1,7 +1,7 @@
 //! Puts the survey together from what was found in each house, and writes it with its page and its recipe.
 //!
-//! The page is there to pick rooms from. The recipe holds the best camera of each room, and the SHA-256 of every file that
-//! the scene is made of.
+//! The page is there to pick rooms from. The recipe holds the best camera of each room, and the SHA-256 of every file
+//! that the scene is made of.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;

@@ -42,8 +42,8 @@ pub struct SurveyOptions {
     pub resolution: [u32; 2],
     /// Vertical field of view of the drawn cameras, in degrees.
     pub fov_y_deg: f64,
-    /// Survey these houses only, and leave the survey of all to a later run without any; each is a house's file, relative
-    /// to the source's folder, or the file's name without `.json`.
+    /// Survey these houses only, and leave the survey of all to a later run without any; each is a house's file,
+    /// relative to the source's folder, or the file's name without `.json`.
     pub only: Vec<String>,
     /// The scenes to choose; every accepted room where absent.
     pub goal: Option<SelectionGoal>,
@@ -55,7 +55,8 @@ pub struct SurveyOptions {
 impl SurveyOptions {
     /// The hash of everything but files that decides what is found in a house, and of the tool that searches.
     pub(super) fn sha256(&self, tool: &str) -> String {
-        // Every setting is printed with all its fields. The text is read by nobody, and the tool's version stands in it.
+        // Every setting is printed with all its fields. The text is read by nobody, and the tool's version stands in
+        // it.
         let Self { source: _, houses: _, models, textures, cameras, rules, lists, .. } = self;
         let Self { camera_rules, seed, cameras_per_room, resolution, fov_y_deg, only: _, goal: _, .. } = self;
         let files = format!("{models:?}\n{textures:?}\n{cameras:?}\n{rules:?}\n{lists:?}");
@@ -89,9 +90,9 @@ pub struct SelectionRules {
     pub max_outside: f64,
     /// Smallest number of pieces that the input view sees.
     pub min_seen_objects: usize,
-    /// Smallest distance from the camera to a surface that any of the five views sees, in metres. Designers place cameras
-    /// close to objects, while drawn cameras keep a metre away; but some of the designers' cameras lie in the plane of a
-    /// wall, and half of such a picture is noise.
+    /// Smallest distance from the camera to a surface that any of the five views sees, in metres. Designers place
+    /// cameras close to objects, while drawn cameras keep a metre away; but some of the designers' cameras lie in the
+    /// plane of a wall, and half of such a picture is noise.
     pub min_nearest_m: f64,
 }
 

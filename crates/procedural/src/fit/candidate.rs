@@ -103,8 +103,8 @@ const FACTOR: f64 = 2.0;
 /// The greatest square that counts: what is seen decides on unusual sizes too.
 const MOST: f64 = 6.0;
 
-/// The mean square of the logarithms of a graph's sizes over those of its defaults, in standard deviations; 0 for graphs
-/// without sizes. Gaps and shifts do not count.
+/// The mean square of the logarithms of a graph's sizes over those of its defaults, in standard deviations; 0 for
+/// graphs without sizes. Gaps and shifts do not count.
 pub(super) fn unusual(graph: &Graph, settings: &Settings) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (at, slot) in slots(graph).iter().enumerate() {

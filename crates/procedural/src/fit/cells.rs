@@ -28,7 +28,8 @@ const LEAST_VARIANCE: f64 = 1e-6;
 /// Turns in degrees, and shifts in metres, at which the same cells are elsewhere.
 const ELSEWHERE: [[f64; 3]; 4] = [[13.0, 0.31, 0.17], [-17.0, -0.23, 0.41], [29.0, 0.13, -0.37], [-37.0, 0.53, 0.11]];
 
-/// The number of each point's cell, and the price of what else was chosen to find them; `None` for graphs without cells.
+/// The number of each point's cell, and the price of what else was chosen to find them; `None` for graphs without
+/// cells.
 fn cells(model: &Model, settings: &Settings, points: &[Point]) -> Option<(Vec<i64>, f64)> {
     let tone = model.tone.as_ref()?;
     let chosen: Vec<usize> = std::iter::once(tone.slot).chain(tone.colors.iter().copied()).collect();
@@ -256,8 +257,8 @@ enum Move<'a> {
     Scale(&'a [(&'a str, [f64; 2])]),
 }
 
-/// Moves, turns and scales the cells as long as that makes the points of a cell more alike. Nothing where a graph has no
-/// cells.
+/// Moves, turns and scales the cells as long as that makes the points of a cell more alike. Nothing where a graph has
+/// no cells.
 pub(super) fn settled(model: &Model, layout: Layout, settings: Settings, points: &[Point]) -> Settings {
     let Some(mut least) = cell_error(model, &settings, points) else { return settings };
     let [both, u, v] = [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
@@ -339,8 +340,8 @@ const FACTORS: [(f64, u32); 6] = [(0.5, 1), (2.0, 2), (1.0 / 3.0, 1), (3.0, 3), 
 /// The number of shifts from row to row that are tried.
 const SHIFTS: u32 = 80;
 
-/// The settings with the size, the shift of rows, or the whole number that leaves the least error of cells; `None` where
-/// those are the ones they have.
+/// The settings with the size, the shift of rows, or the whole number that leaves the least error of cells; `None`
+/// where those are the ones they have.
 pub(super) fn better(model: &Model, layout: Layout, settings: &Settings, points: &[Point]) -> Option<Settings> {
     let before = cell_error(model, settings, points)?;
     let mut all = match layout {

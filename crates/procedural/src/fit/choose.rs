@@ -33,8 +33,8 @@ pub const LEAST_POINTS: usize = 400;
 /// By how much the score of a graph must be below that of a single colour.
 const LEAST_GAIN: f64 = 0.05;
 
-/// Points whose mean square difference from one colour is below this are one colour: storing colours as bytes changes as
-/// much.
+/// Points whose mean square difference from one colour is below this are one colour: storing colours as bytes changes
+/// as much.
 const LEAST_VARIANCE: f64 = 2e-6;
 
 /// The most error of what is predictable in a graph, in those of a single colour.
@@ -91,8 +91,9 @@ const RANDOM: usize = 5;
 /// How many of those are refined from two starts.
 const TWICE: usize = 2;
 
-/// The fit of a part. What is random in a graph has its look and not its place, so that a texture of variance s^2 adds s^2
-/// to the mean square of the differences from what is seen; [`Candidate::with_detail`] removes as much as is wanted.
+/// The fit of a part. What is random in a graph has its look and not its place, so that a texture of variance s^2 adds
+/// s^2 to the mean square of the differences from what is seen; [`Candidate::with_detail`] removes as much as is
+/// wanted.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The graph that was chosen; `paint` where none is better than a colour.
@@ -127,8 +128,8 @@ impl Fitter {
         Ok(Self { paint: Model::new(paint, Some(Class::Flat)), patterns, textures })
     }
 
-    /// Adds a user's graphs, which are fitted by the names of their parameters ([`super::model::Role`]) and by statistics
-    /// only: nothing is known of their periods.
+    /// Adds a user's graphs, which are fitted by the names of their parameters ([`super::model::Role`]) and by
+    /// statistics only: nothing is known of their periods.
     pub fn with_graphs(mut self, graphs: Vec<Graph>) -> Self {
         self.textures.extend(graphs.into_iter().map(|graph| Model::new(graph, None)));
         self
@@ -253,8 +254,8 @@ fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
     pixels + STATISTICS * compressed(candidate.distance) + price - prior
 }
 
-/// The distance of statistics, which grows like its logarithm from [`FAR`] on: pixels that agree count for more than how
-/// far off a few statistics are.
+/// The distance of statistics, which grows like its logarithm from [`FAR`] on: pixels that agree count for more than
+/// how far off a few statistics are.
 fn compressed(distance: f64) -> f64 {
     if distance > FAR { FAR * (1.0 + libm::log(distance / FAR)) } else { distance }
 }

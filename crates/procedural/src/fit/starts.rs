@@ -1,4 +1,5 @@
-//! Starts of a fit: turn, sizes and shift of a periodic graph, from the waves of what is seen and the graph's own waves.
+//! Starts of a fit: turn, sizes and shift of a periodic graph, from the waves of what is seen and the graph's own
+//! waves.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -1,4 +1,5 @@
-//! The XML as a tree of plain elements, and the limits on this untrusted input, which are checked before memory is taken.
+//! The XML as a tree of plain elements, and the limits on this untrusted input, which are checked before memory is
+//! taken.
 
 use crate::error::{Code, Findings};
 use crate::value::shortened;

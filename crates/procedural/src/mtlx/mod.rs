@@ -178,8 +178,9 @@ fn surface_input(output: Output) -> &'static str {
     }
 }
 
-/// Reports shaders and materials that show anything but the graph's outputs. The material that a graph feeds in programs
-/// that read `.mtlx` is checked, since other inputs would change the look without changing what is evaluated here.
+/// Reports shaders and materials that show anything but the graph's outputs. The material that a graph feeds in
+/// programs that read `.mtlx` is checked, since other inputs would change the look without changing what is evaluated
+/// here.
 fn check_shaders(root: &Element, graph: &str, findings: &mut Findings) {
     let surfaces = root.children.iter().filter(|child| child.tag == "standard_surface");
     let surfaces: BTreeSet<&str> = surfaces.map(Element::name).collect();

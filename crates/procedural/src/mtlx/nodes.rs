@@ -1,5 +1,5 @@
-//! What a `<nodegraph>` holds: its inputs as parameters, with `uimin` and `uimax` as their range; its nodes and outputs,
-//! with their types and connections, in an order in which each node follows those that it depends on.
+//! What a `<nodegraph>` holds: its inputs as parameters, with `uimin` and `uimax` as their range; its nodes and
+//! outputs, with their types and connections, in an order in which each node follows those that it depends on.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -4,13 +4,11 @@
 mod lower;
 pub mod op;
 
-use std::collections::BTreeMap;
-
 use crate::graph::{FOOTPRINT, Graph, Node, Source, first_slot};
 use crate::node::{InputDef, Unset};
 use crate::value::{Type, Value};
-use lower::{Argument, lower};
-use op::{Binary, Count, Op, Reg, Unary};
+use lower::{Argument, Builder, lower};
+use op::{Count, Op, Reg};
 
 /// The number of scalars that the outputs of a graph have: red, green and blue of the base colour, roughness, metallic.
 pub const OUTPUTS: usize = 5;
@@ -113,54 +111,4 @@ fn whole(value: &Value) -> i32 {
     #[allow(clippy::cast_possible_truncation, reason = "integers are parsed as 32 bits")]
     let number = value.numbers()[0] as i32;
     number
-}
-
-/// A list of instructions, each after its operands.
-#[derive(Default)]
-pub struct Builder {
-    ops: Vec<Op>,
-    known: BTreeMap<Op, Reg>,
-}
-
-impl Builder {
-    /// The result of an instruction.
-    pub fn push(&mut self, op: Op) -> Reg {
-        if let Some(&known) = self.known.get(&op) {
-            return known;
-        }
-        let reg = Reg(u32::try_from(self.ops.len()).expect("limits keep programs below 2^32 instructions"));
-        self.ops.push(op);
-        self.known.insert(op, reg);
-        reg
-    }
-
-    pub fn number(&mut self, number: f64) -> Reg {
-        self.push(Op::Number(number.to_bits()))
-    }
-
-    /// A function of one number.
-    pub fn unary(&mut self, function: Unary, x: Reg) -> Reg {
-        self.push(Op::Unary(function, [x]))
-    }
-
-    /// A function of two numbers.
-    pub fn binary(&mut self, function: Binary, a: Reg, b: Reg) -> Reg {
-        self.push(Op::Binary(function, [a, b]))
-    }
-
-    pub fn add(&mut self, a: Reg, b: Reg) -> Reg {
-        self.binary(Binary::Add, a, b)
-    }
-
-    pub fn sub(&mut self, a: Reg, b: Reg) -> Reg {
-        self.binary(Binary::Sub, a, b)
-    }
-
-    pub fn mul(&mut self, a: Reg, b: Reg) -> Reg {
-        self.binary(Binary::Mul, a, b)
-    }
-
-    pub fn into_ops(self) -> Vec<Op> {
-        self.ops
-    }
 }

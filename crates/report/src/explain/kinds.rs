@@ -270,9 +270,9 @@ fn multiply(model: &mut Model, scales: [f64; 3]) {
     }
 }
 
-/// Step 3: the factor 1 + q for each pixel, where q is the quadratic polynomial of its position that brings model · (1 + q)
-/// nearest to the truth: the residual is projected on the products of the model and each term. All channels share the
-/// polynomial.
+/// Step 3: the factor 1 + q for each pixel, where q is the quadratic polynomial of its position that brings model · (1
+/// + q) nearest to the truth: the residual is projected on the products of the model and each term. All channels share
+/// the polynomial.
 fn factors(patch: &Patch, model: &[[f64; 3]]) -> Vec<f64> {
     if model.len() < FEWEST_PIXELS {
         return vec![1.0; model.len()];
@@ -349,10 +349,10 @@ fn shaded(model: &[[f64; 3]], factors: &[f64]) -> Vec<[f64; 3]> {
     model.iter().zip(factors).map(|(value, factor)| value.map(|v| v * factor)).collect()
 }
 
-/// Step 4: moves the model by the whole pixels that bring it, times the factors, nearest to the truth, and multiplies it by the
-/// factors. Returns none if the model is best unmoved. Factors do not move, and a pixel whose new value would come from
-/// outside the instance keeps its own, so that a flat prediction cannot improve. Of equally good shifts, the first by
-/// row, then by column, is taken.
+/// Step 4: moves the model by the whole pixels that bring it, times the factors, nearest to the truth, and multiplies
+/// it by the factors. Returns none if the model is best unmoved. Factors do not move, and a pixel whose new value would
+/// come from outside the instance keeps its own, so that a flat prediction cannot improve. Of equally good shifts, the
+/// first by row, then by column, is taken.
 fn take_shift(patch: &Patch, model: &mut [[f64; 3]], factors: &[f64]) -> Option<Shift> {
     let farthest = if model.len() < FEWEST_PIXELS { 0 } else { FARTHEST };
     let (mut least, mut best) = (patch_error(&patch.truth, &shaded(model, factors)), [0, 0]);
@@ -387,8 +387,8 @@ fn moved_error(patch: &Patch, model: &[[f64; 3]], factors: &[f64], shift: [isize
     sum
 }
 
-/// Step 5: adds b · (t - G t) to the model, with the b and the Gaussian G that bring it nearest to the truth t. Returns the
-/// standard deviation of G, or none if no b above 0 brings the model nearer. G averages over the instance's pixels
+/// Step 5: adds b · (t - G t) to the model, with the b and the Gaussian G that bring it nearest to the truth t. Returns
+/// the standard deviation of G, or none if no b above 0 brings the model nearer. G averages over the instance's pixels
 /// alone.
 fn take_detail(patches: &[Patch], model: &mut Model) -> Option<f64> {
     let mut best: Option<(f64, f64, f64, Model)> = None;

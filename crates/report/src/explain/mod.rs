@@ -15,11 +15,11 @@ pub mod text;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_eval::open_scene::scored_views;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::{PictureKind, ResultKey};
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_eval::scene::scored_views;
 use mateval_eval::shown::{SceneAlbedo, scene_albedo};
 use mateval_image::store::write_whole;
 use mateval_image::transfer::byte_from_unit;
@@ -347,8 +347,8 @@ mod tests {
 
     type Pixel = [f64; 3];
 
-    /// White noise from 0.3 to 0.7, three fourths of it shared by all channels, computed from the position with integers
-    /// alone.
+    /// White noise from 0.3 to 0.7, three fourths of it shared by all channels, computed from the position with
+    /// integers alone.
     fn texture(x: i64, y: i64) -> Pixel {
         let noise = |channel: i64| {
             let mut word =
@@ -453,8 +453,8 @@ mod tests {
         check(&found, 6, 0.75);
     }
 
-    /// A disc whose upper part the photo does not show: an error there is of no other kind, and does not change the kinds
-    /// of the errors in the lower part.
+    /// A disc whose upper part the photo does not show: an error there is of no other kind, and does not change the
+    /// kinds of the errors in the lower part.
     #[test]
     fn errors_of_hidden_surfaces_stay_apart() {
         let hidden = |mut patches: Vec<Patch>| {

@@ -1,5 +1,5 @@
-//! Scores that put the explanation in context: those of the albedo after scaling alone, with one scale for each picture,
-//! each instance or the whole scene; and the worst instances under each light, from the result alone.
+//! Scores that put the explanation in context: those of the albedo after scaling alone, with one scale for each
+//! picture, each instance or the whole scene; and the worst instances under each light, from the result alone.
 
 use std::collections::BTreeMap;
 

@@ -127,8 +127,8 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
 }
 
 impl TracerNote {
-    /// The check that speaks most against the tracer, as results may state different ones: it is not part of a dataset's
-    /// identity.
+    /// The check that speaks most against the tracer, as results may state different ones: it is not part of a
+    /// dataset's identity.
     fn of(board: &Board<'_>) -> Self {
         let checks = board.results.iter().chain(board.ceiling).filter_map(|result| result.tracer_check.as_ref());
         match checks.max_by_key(|check| (check.informative.saturating_sub(check.agree), Reverse(check.informative))) {

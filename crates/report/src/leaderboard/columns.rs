@@ -1,5 +1,5 @@
-//! The columns of the board and their cells: one column for each key of the results, chosen by picture, views, metric and
-//! surfaces, and one for each fact about methods. Also how pages name a method.
+//! The columns of the board and their cells: one column for each key of the results, chosen by picture, views, metric
+//! and surfaces, and one for each fact about methods. Also how pages name a method.
 
 use mateval_eval::result::key::{Better, Metric};
 use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};

@@ -97,9 +97,9 @@ pub struct Entries {
     pub errata: Option<ErrataFile>,
 }
 
-/// Reads the files. Fails with every reason for which they cannot make a board: a file is something else, a board cannot
-/// show the name of a method, or two results have the same name or submission. A file that the system does not let us
-/// read is the only reason then.
+/// Reads the files. Fails with every reason for which they cannot make a board: a file is something else, a board
+/// cannot show the name of a method, or two results have the same name or submission. A file that the system does not
+/// let us read is the only reason then.
 pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
     let (mut entries, mut paths, mut findings) = (Entries::default(), Vec::new(), Vec::new());
     for path in &files.results {
@@ -248,8 +248,8 @@ fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<Result
     Ok(Some(result))
 }
 
-/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends the
-/// reading.
+/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends
+/// the reading.
 fn fitting<T>(
     read: Result<T, ReportError>,
     expected: &str,
@@ -275,7 +275,8 @@ fn fitting<T>(
     Ok(None)
 }
 
-/// A finding for each file whose value an earlier file has too. `what` names the value, and `place` is its JSON pointer.
+/// A finding for each file whose value an earlier file has too. `what` names the value, and `place` is its JSON
+/// pointer.
 fn repeated<'a>(
     paths: &[&Path],
     values: impl Iterator<Item = &'a str>,

@@ -1,12 +1,14 @@
 //! `leaderboard.json`: everything that a leaderboard shows about its methods, for programs.
 
-use super::entries::Verified;
-use crate::ranking::file::Ranking;
+use std::collections::BTreeMap;
+
 use mateval_eval::result::key::ResultKey;
 use mateval_scene::submission::Cost;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+
+use super::entries::Verified;
+use crate::ranking::file::Ranking;
 
 /// The format of this version of leaderboards.
 pub const LEADERBOARD_FORMAT: &str = "mateval-leaderboard/1";

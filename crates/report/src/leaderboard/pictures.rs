@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use mateval_eval::open_scene::scored_views;
 use mateval_eval::result::key::PictureKind;
-use mateval_eval::scene::scored_views;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, SrgbRgb, png_io};
 use mateval_scene::dataset::SceneFile;

@@ -1,5 +1,5 @@
-//! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers were
-//! measured on other renders and are never ranked with results.
+//! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers
+//! were measured on other renders and are never ranked with results.
 
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::key::{Better, Metric};

@@ -1,5 +1,5 @@
-//! The rooms in 3D: for each scene one script with its public geometry, and one for each method with its atlases as small
-//! pictures.
+//! The rooms in 3D: for each scene one script with its public geometry, and one for each method with its atlases as
+//! small pictures.
 //!
 //! They are scripts because browsers let a page that is opened from the disk load scripts, but not read other files.
 

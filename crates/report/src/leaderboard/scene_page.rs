@@ -1,5 +1,5 @@
-//! The pages of a scene: all methods side by side in all views, the slider between prediction and truth, and scores; and
-//! its room in 3D, for which `rooms` writes the scripts.
+//! The pages of a scene: all methods side by side in all views, the slider between prediction and truth, and scores;
+//! and its room in 3D, for which `rooms` writes the scripts.
 
 use std::collections::BTreeSet;
 use std::io::Read as _;

@@ -1,5 +1,5 @@
-//! Intervals of methods and comparisons of pairs, from the same draws of houses for all of them. Scenes of one house are
-//! alike, so that scores are summed by house and whole houses are drawn.
+//! Intervals of methods and comparisons of pairs, from the same draws of houses for all of them. Scenes of one house
+//! are alike, so that scores are summed by house and whole houses are drawn.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

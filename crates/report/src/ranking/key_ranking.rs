@@ -1,5 +1,5 @@
-//! The ranking by one score, which compares each pair of methods on the scenes that both have. Ranks are ranges: methods
-//! whose difference may be chance share ranks.
+//! The ranking by one score, which compares each pair of methods on the scenes that both have. Ranks are ranges:
+//! methods whose difference may be chance share ranks.
 
 use mateval_eval::result::key::Better;
 
@@ -189,8 +189,8 @@ fn corrected(p_values: &[f64]) -> Vec<f64> {
     corrected
 }
 
-/// The range of ranks of each of `methods` methods: a method ranks below all that are significantly better and above all
-/// that are significantly worse. `beaten` holds pairs of a winner and a loser, as places in the list of methods.
+/// The range of ranks of each of `methods` methods: a method ranks below all that are significantly better and above
+/// all that are significantly worse. `beaten` holds pairs of a winner and a loser, as places in the list of methods.
 fn rank_ranges(methods: usize, beaten: &[(usize, usize)]) -> Vec<RankRange> {
     let mut ranks = vec![RankRange { best: 1, worst: methods }; methods];
     for (winner, loser) in beaten {

@@ -1,8 +1,8 @@
 //! Ranks methods: an interval for every score, a comparison of every pair of methods, and ranks as ranges.
 //!
 //! Scenes of one house are alike, so that whole houses are drawn with replacement, the same ones for all methods:
-//! `bootstrap` draws them and computes intervals and p-values, `key_ranking` corrects these for their number and derives
-//! the ranks by one score. Here, results are checked for being comparable, and their numbers gathered by score.
+//! `bootstrap` draws them and computes intervals and p-values, `key_ranking` corrects these for their number and
+//! derives the ranks by one score. Here, results are checked for being comparable, and their numbers gathered by score.
 
 mod bootstrap;
 pub mod file;
@@ -309,7 +309,8 @@ pub(crate) mod tests {
     const TRUTH: f64 = 25.0;
 
     /// Houses of one to four scenes and equally good methods. PSNR varies by 2 dB between houses and by 1 dB between
-    /// scenes, alike for all methods, and independently for each method by 1 dB between houses and by 1 dB between views.
+    /// scenes, alike for all methods, and independently for each method by 1 dB between houses and by 1 dB between
+    /// views.
     fn simulate(houses: usize, seed: u64) -> Simulated {
         let mut chance = Chance(seed, 0);
         let mut board =

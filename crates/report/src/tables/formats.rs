@@ -99,7 +99,8 @@ fn latex_text(text: &str) -> String {
         .collect()
 }
 
-/// Comma-separated values, with all digits. The table's title is the head of the column of methods. Missing values are empty.
+/// Comma-separated values, with all digits. The table's title is the head of the column of methods. Missing values are
+/// empty.
 pub(super) fn csv(table: &Table<'_>) -> String {
     let names = table.group_head.into_iter().chain([table.title]).map(quoted);
     let heads = table.columns.iter().flat_map(|column| {
@@ -126,15 +127,16 @@ fn numbers(column: &Column, cell: &Cell) -> impl Iterator<Item = String> {
     [number(cell.value.map(|value| value.value))].into_iter().chain(error)
 }
 
-/// A cell of text in quotation marks. A single quote goes before text that a spreadsheet would take for a formula (OWASP,
-/// "CSV Injection"): names of methods are untrusted. Numbers have no such quote, as they may begin with a minus.
+/// A cell of text in quotation marks. A single quote goes before text that a spreadsheet would take for a formula
+/// (OWASP, "CSV Injection"): names of methods are untrusted. Numbers have no such quote, as they may begin with a
+/// minus.
 pub(crate) fn quoted(text: &str) -> String {
     let guard = if text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n']) { "'" } else { "" };
     format!("\"{guard}{}\"", text.replace('"', "\"\""))
 }
 
-/// Aligned text for a terminal of 80 columns: a heading and the table. Standard errors are left out, since they make rows longer than a line. With `bold` the best
-/// value of each column is bold.
+/// Aligned text for a terminal of 80 columns: a heading and the table. Standard errors are left out, since they make
+/// rows longer than a line. With `bold` the best value of each column is bold.
 pub(super) fn aligned(table: &Table<'_>, bold: bool) -> String {
     let mut text = format!("{}\n\n", table.title);
     let names: Vec<Vec<String>> = table

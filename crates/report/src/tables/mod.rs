@@ -34,8 +34,8 @@ pub enum TableFormat {
 
 /// Puts the results side by side under one protocol. Results with different fingerprints or scenes are refused. A
 /// column without values is left out. A value is shown as missing if another result has it for that scene or category,
-/// and as a dash if none has or the submission does not predict that map. The result of the truth itself, the `ceiling`,
-/// has the last row of each group and no mark.
+/// and as a dash if none has or the submission does not predict that map. The result of the truth itself, the
+/// `ceiling`, has the last row of each group and no mark.
 pub fn tables(
     results: &[ResultFile],
     ceiling: Option<&ResultFile>,

@@ -1,5 +1,5 @@
-//! The files of a house: its JSON, with the keys of 3D-FRONT's third release, and its models: for each a folder with `raw_model.obj`, `model.mtl` and `texture.png`, and `model_info.json`, which
-//! lists them.
+//! The files of a house: its JSON, with the keys of 3D-FRONT's third release, and its models: for each a folder with
+//! `raw_model.obj`, `model.mtl` and `texture.png`, and `model_info.json`, which lists them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,9 +1,10 @@
 //! A house as data, from which its files follow: rooms with their meshes, furniture and cameras, and the materials,
 //! textures and models that they name; and the two rooms of the built-in house.
 //!
-//! Meshes are made of rectangles and boxes. Positions and texture coordinates are in metres, as in the data, +y up, the floor at y = 0. On a plan with -z at the top, the living room is in the west and the bedroom is east
-//! of it behind an opening without a door. The door in the living room's south wall is shut, and the outer wall behind it
-//! has no opening, so that no light comes in around the door.
+//! Meshes are made of rectangles and boxes. Positions and texture coordinates are in metres, as in the data, +y up, the
+//! floor at y = 0. On a plan with -z at the top, the living room is in the west and the bedroom is east of it behind an
+//! opening without a door. The door in the living room's south wall is shut, and the outer wall behind it has no
+//! opening, so that no light comes in around the door.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -148,8 +149,8 @@ impl ArchitectureMesh {
         self
     }
 
-    /// Adds an upright wall that starts at `foot` and runs along `along`, to the right seen from its front. u is measured
-    /// from the start, v downwards from the top.
+    /// Adds an upright wall that starts at `foot` and runs along `along`, to the right seen from its front. u is
+    /// measured from the start, v downwards from the top.
     pub fn wall(self, foot: DVec3, along: DVec3, height: f64, holes: &[WallHole]) -> Self {
         let (length, right) = (along.length(), along.normalize());
         let mut holes = holes.to_vec();
@@ -184,8 +185,8 @@ impl ArchitectureMesh {
         self.rectangle(DVec3::new(low.x, y, low.y), right, up, DVec2::new(0.0, -size.y))
     }
 
-    /// Adds the inner sides of a hole through a wall, between two corners, facing into the hole: the left, right and upper
-    /// sides and, with `sill`, the lower one. The hole passes through the wall along the shorter of x and z.
+    /// Adds the inner sides of a hole through a wall, between two corners, facing into the hole: the left, right and
+    /// upper sides and, with `sill`, the lower one. The hole passes through the wall along the shorter of x and z.
     pub fn reveal(mut self, low: DVec3, high: DVec3, sill: bool) -> Self {
         let size = high - low;
         let through_x = size.x < size.z;
@@ -298,8 +299,8 @@ fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHol
     board
 }
 
-/// Outer walls, and the tops and bottoms of walls. An outer wall is given by its start and its extent, which runs to the
-/// right seen from outside; `plans` are corners (x, z) of walls on the plan.
+/// Outer walls, and the tops and bottoms of walls. An outer wall is given by its start and its extent, which runs to
+/// the right seen from outside; `plans` are corners (x, z) of walls on the plan.
 pub fn outside(lines: &[(DVec3, DVec3)], plans: &[[f64; 4]], openings: &[Opening]) -> Vec<ArchitectureMesh> {
     let outer = lines.iter().map(|&(foot, along)| {
         ArchitectureMesh::new("WallOuter", "outer_wall").wall(foot, along, HEIGHT, &holes_of(foot, along, openings))
@@ -347,8 +348,8 @@ pub(super) fn living_room() -> Room {
     }
 }
 
-/// The living room's shell and outer sides, the opening to the bedroom, the door, the window and the suspended ceiling. The
-/// last mesh closes the house behind the door.
+/// The living room's shell and outer sides, the opening to the bedroom, the door, the window and the suspended ceiling.
+/// The last mesh closes the house behind the door.
 fn living_room_meshes() -> Vec<ArchitectureMesh> {
     let mut meshes = shell(&LIVING_ROOM, &OPENINGS);
     meshes.extend(outside(
@@ -398,8 +399,8 @@ fn window_bars() -> ArchitectureMesh {
     bars
 }
 
-/// A suspended ceiling: four boxes whose tops lie in the ceiling, a sheet just below the ceiling, and light strips along
-/// the inner edges.
+/// A suspended ceiling: four boxes whose tops lie in the ceiling, a sheet just below the ceiling, and light strips
+/// along the inner edges.
 fn hung_ceiling() -> Vec<ArchitectureMesh> {
     let (low, high, wide, bottom) = (LIVING_ROOM.low, LIVING_ROOM.high, 0.5, 2.55);
     let mut frame = ArchitectureMesh::new("CustomizedCeiling", "ceiling");
@@ -530,7 +531,8 @@ mod tests {
         }
     }
 
-    /// Every opening is cut into the walls on both of its sides, except the door, which is blind, and into no other wall.
+    /// Every opening is cut into the walls on both of its sides, except the door, which is blind, and into no other
+    /// wall.
     #[test]
     fn holes_go_through() {
         let lines = [LIVING_ROOM, BEDROOM].into_iter().flat_map(|room| wall_lines(&room));

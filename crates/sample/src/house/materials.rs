@@ -1,7 +1,8 @@
-//! The materials of floors, walls and fittings, and their textures, whose letters and arrows show their orientation. Some
-//! textures are stored mirrored or rotated, which their materials' `UVTransform` undoes.
+//! The materials of floors, walls and fittings, and their textures, whose letters and arrows show their orientation.
+//! Some textures are stored mirrored or rotated, which their materials' `UVTransform` undoes.
 //!
-//! The texture of a piece of furniture has up to four fields, two by two. An unused field has opacity 0, as in the data.
+//! The texture of a piece of furniture has up to four fields, two by two. An unused field has opacity 0, as in the
+//! data.
 
 use mateval_image::Picture;
 
@@ -131,8 +132,8 @@ fn wallpaper(u: f64, v: f64) -> Color {
     lettered(&[name, top], u, v, ground, [0.36, 0.47, 0.41])
 }
 
-/// Oak planks with an arrow X along +u and an arrow Z along -v (downwards). On a floor, whose u runs along +x and v along
-/// -z, these are the room's axes.
+/// Oak planks with an arrow X along +u and an arrow Z along -v (downwards). On a floor, whose u runs along +x and v
+/// along -z, these are the room's axes.
 fn planks(u: f64, v: f64) -> Color {
     let x = Lettering::fitted(&["X>"], [0.55, 0.40], [0.80, 0.52], 1.0);
     let z = Lettering::fitted(&["Z", "_"], [0.42, 0.55], [0.52, 0.80], 1.0);
@@ -274,8 +275,8 @@ pub struct Lettering {
 }
 
 impl Lettering {
-    /// Text in the middle of the rectangle from `low` to `high`, as large as fits with square dots. `aspect` is the width
-    /// of the surface that shows the picture divided by its height.
+    /// Text in the middle of the rectangle from `low` to `high`, as large as fits with square dots. `aspect` is the
+    /// width of the surface that shows the picture divided by its height.
     pub fn fitted(lines: &'static [&'static str], low: [f64; 2], high: [f64; 2], aspect: f64) -> Self {
         let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(1);
         let columns = (longest * ADVANCE - 1) as f64;

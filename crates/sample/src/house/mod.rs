@@ -1,14 +1,14 @@
 //! The built-in house, under CC0, in the layout of 3D-FRONT and 3D-FUTURE: a living room and a bedroom.
 //!
 //! The input is a folder. Written into it is `house/` with `3D-FRONT/UID.json`, `3D-FRONT-texture/JID/texture.png`,
-//! `3D-FUTURE-model/JID/` (`raw_model.obj`, `model.mtl`, `texture.png`), `model_info.json` and `LICENSE.txt`. The bytes are
-//! the same on every machine.
+//! `3D-FUTURE-model/JID/` (`raw_model.obj`, `model.mtl`, `texture.png`), `model_info.json` and `LICENSE.txt`. The bytes
+//! are the same on every machine.
 //!
 //! `layout` describes a house as data, and builds and furnishes its rooms. `materials` holds the textures of rooms and
-//! furniture, with their letters, and `models` the library of furniture. `files` makes the JSON of a house and writes its
-//! models. This file also makes other houses of the built-in one, for rehearsals of a release at full size: of another
-//! extent, in other colours and wall coverings, and with some of the furniture left out. All houses share the library of
-//! models and textures.
+//! furniture, with their letters, and `models` the library of furniture. `files` makes the JSON of a house and writes
+//! its models. This file also makes other houses of the built-in one, for rehearsals of a release at full size: of
+//! another extent, in other colours and wall coverings, and with some of the furniture left out. All houses share the
+//! library of models and textures.
 //!
 //! The house is sound. The test kit's faulty house is made of the same blocks, which are public for its sake.
 
@@ -50,8 +50,8 @@ pub fn write(out: &Path) -> Result<(), SampleError> {
     write_pictures(&house, out)
 }
 
-/// Writes the houses with the numbers `0..count` into the folder `out`, with the library and the textures of the built-in
-/// house. Returns their files, relative to `out`.
+/// Writes the houses with the numbers `0..count` into the folder `out`, with the library and the textures of the
+/// built-in house. Returns their files, relative to `out`.
 pub fn write_variants(out: &Path, count: u32, seed: u64) -> Result<Vec<String>, SampleError> {
     write(out)?;
     let built_in = files::house_json(&built_in());
@@ -259,7 +259,8 @@ mod tests {
         use sha2::{Digest as _, Sha256};
         let first = files();
         assert_eq!(first, files());
-        // Five textures of the architecture; three files for each of 13 models; the house, the list of models, the licence.
+        // Five textures of the architecture; three files for each of 13 models; the house, the list of models, the
+        // licence.
         assert_eq!(first.len(), 5 + 13 * 3 + 3);
         let total: usize = first.values().map(Vec::len).sum();
         assert!(total < 3_000_000, "{total}");

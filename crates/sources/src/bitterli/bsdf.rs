@@ -1,5 +1,6 @@
-//! BSDFs. Any nesting of wrappers (`twosided`, `mask`, `bumpmap`) around one model becomes one material. The innermost one
-//! scatters light, with Mitsuba's defaults for absent parameters and the indices of refraction that Mitsuba knows by name.
+//! BSDFs. Any nesting of wrappers (`twosided`, `mask`, `bumpmap`) around one model becomes one material. The innermost
+//! one scatters light, with Mitsuba's defaults for absent parameters and the indices of refraction that Mitsuba knows
+//! by name.
 
 use mateval_scene::findings::shortened;
 use mateval_scene::material::{

@@ -1,8 +1,8 @@
-//! Constant colours in every form that Mitsuba 0.5 to 3 documents: `<rgb>`, `<srgb>`, `<float>`, `<spectrum>` by pairs of
-//! wavelength and value, by one value, from a file and by plugin, and `<blackbody>`.
+//! Constant colours in every form that Mitsuba 0.5 to 3 documents: `<rgb>`, `<srgb>`, `<float>`, `<spectrum>` by pairs
+//! of wavelength and value, by one value, from a file and by plugin, and `<blackbody>`.
 //!
-//! Spectra become linear Rec. 709 as in Mitsuba 3.9.1's RGB mode: the CIE 1931 observer sees a reflectance under D65, and
-//! an emission as it is.
+//! Spectra become linear Rec. 709 as in Mitsuba 3.9.1's RGB mode: the CIE 1931 observer sees a reflectance under D65,
+//! and an emission as it is.
 
 use mateval_image::limits::without_mark;
 use mateval_scene::findings::shortened;
@@ -134,8 +134,8 @@ const OBSERVER: [[f64; 3]; SAMPLES] = [
     [0.0000012511, 0.0000004518, 0.0],
 ];
 
-/// The relative power of the illuminant D65 (CIE 015:2018, table 5) at the same wavelengths, scaled so that a surface which
-/// reflects everything has luminance 1.
+/// The relative power of the illuminant D65 (CIE 015:2018, table 5) at the same wavelengths, scaled so that a surface
+/// which reflects everything has luminance 1.
 const D65: [f64; SAMPLES] = [
     0.471106, 0.498636, 0.526166, 0.515491, 0.504816, 0.528416, 0.552016, 0.693973, 0.83593, 0.880027, 0.924125,
     0.933953, 0.94378, 0.90969, 0.875602, 0.967435, 1.05927, 1.12059, 1.18193, 1.18599, 1.19005, 1.17514, 1.16024,
@@ -267,7 +267,8 @@ fn many(text: &str) -> Result<Vec<f64>, ValueError> {
     if list.len() > MOST_PAIRS { Err(ValueError::TooManyNumbers { most: MOST_PAIRS }) } else { Ok(list) }
 }
 
-/// The colour of a spectrum of pairs of wavelength in nanometres and value, between which it is linear. It is 0 outside.
+/// The colour of a spectrum of pairs of wavelength in nanometres and value, between which it is linear. It is 0
+/// outside.
 fn integrated(pairs: &[(f64, f64)], usage: ColorUse) -> Result<[f64; 3], ValueError> {
     if pairs.len() < 2 || pairs.windows(2).any(|two| two[0].0 >= two[1].0) {
         return Err(ValueError::NotASpectrum);

@@ -9,7 +9,8 @@ use mateval_scene::source_folder::SourceFolder;
 
 use crate::source_scene::Log;
 
-/// Limits on an untrusted scene, checked before memory is taken. Exceeding one is an error for the XML itself, and a finding for anything else.
+/// Limits on an untrusted scene, checked before memory is taken. Exceeding one is an error for the XML itself, and a
+/// finding for anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of the XML, before and after variables are substituted.
@@ -163,8 +164,8 @@ const MOST_INCLUDES: usize = 8;
 pub(super) type Ids<'a> = BTreeMap<&'a str, &'a Element>;
 
 impl Document {
-    /// Parses XML, with the files that it includes from `folder`. Fails where it is not well-formed, is not a `<scene>`, or
-    /// exceeds a limit.
+    /// Parses XML, with the files that it includes from `folder`. Fails where it is not well-formed, is not a
+    /// `<scene>`, or exceeds a limit.
     pub(super) fn parse(
         text: &str,
         limits: &Limits,
@@ -346,7 +347,8 @@ impl Builder<'_> {
         Ok(element)
     }
 
-    /// The elements of the file that an `<include>` names. As in Mitsuba, they stand in its place, and variables are shared.
+    /// The elements of the file that an `<include>` names. As in Mitsuba, they stand in its place, and variables are
+    /// shared.
     fn included(&mut self, include: &Element, depth: usize) -> Result<Vec<Element>, BitterliError> {
         let line = include.line;
         let refused = |reason| BitterliError::Include { line, reason };

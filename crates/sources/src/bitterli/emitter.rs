@@ -251,8 +251,8 @@ fn bake(sky: &SunSky) -> Option<Texture> {
     Texture::new(columns, ROWS, Texels::Linear(texels), Wrap::Repeat).ok()
 }
 
-/// Spreads the sun's power over the texels that its disc covers. As in Mitsuba, the power is that of a disc of the sun's
-/// real size, whatever size is set.
+/// Spreads the sun's power over the texels that its disc covers. As in Mitsuba, the power is that of a disc of the
+/// sun's real size, whatever size is set.
 fn add_sun(texels: &mut [[f32; 3]], sky: &SunSky) {
     let Some(disc) = MapDisc::new(sky.sun, sky.sun_diameter_deg) else { return };
     // Each covered texel takes its share of the power.
@@ -345,8 +345,8 @@ fn ozone(nanometres: f64) -> f64 {
     OZONE[lower] * (1.0 - part) + OZONE[lower + 1] * part
 }
 
-/// The CIE 1931 colour matching functions, after Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE XYZ
-/// color matching functions" (JCGT 2013).
+/// The CIE 1931 colour matching functions, after Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE
+/// XYZ color matching functions" (JCGT 2013).
 fn cie_1931(nanometres: f64) -> [f64; 3] {
     let bump = |height: f64, centre: f64, below: f64, above: f64| {
         let t = (nanometres - centre) * if nanometres < centre { below } else { above };

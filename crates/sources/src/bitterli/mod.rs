@@ -1,13 +1,13 @@
 //! Reads Bitterli's scenes: Mitsuba XML of versions 0.5, 0.6 and 3, with OBJ meshes and textures beside it.
 //!
-//! The input is the path of a scene's XML; no file outside its folder is read. The output is a [`BitterliScene`]. Elements
-//! that are unknown, missing or faulty are left out or replaced and reported as findings. An error means that there is no
-//! scene to read or no camera to look through.
+//! The input is the path of a scene's XML; no file outside its folder is read. The output is a [`BitterliScene`].
+//! Elements that are unknown, missing or faulty are left out or replaced and reported as findings. An error means that
+//! there is no scene to read or no camera to look through.
 //!
-//! `document` parses the XML into a tree: it checks depth and size, substitutes variables and writes names in snake_case.
-//! `reader` hands a plugin the parameters it knows and reports the others. Each kind of plugin has its own file: `sensor`,
-//! `shape`, `bsdf`, `texture` (with `color`) and `emitter`. Where Mitsuba's documentation is silent, the reader does what
-//! Mitsuba 3.9.1 does; the tests cite its results.
+//! `document` parses the XML into a tree: it checks depth and size, substitutes variables and writes names in
+//! snake_case. `reader` hands a plugin the parameters it knows and reports the others. Each kind of plugin has its own
+//! file: `sensor`, `shape`, `bsdf`, `texture` (with `color`) and `emitter`. Where Mitsuba's documentation is silent,
+//! the reader does what Mitsuba 3.9.1 does; the tests cite its results.
 
 mod bsdf;
 mod color;
@@ -62,8 +62,8 @@ pub struct BitterliScene {
     pub missing: Missing,
 }
 
-/// Reads the scene whose XML is at `xml_path`. `camera` is the place of the camera that will be used instead of the scene's
-/// own; it decides with that whether the scene is moved nearer to the origin.
+/// Reads the scene whose XML is at `xml_path`. `camera` is the place of the camera that will be used instead of the
+/// scene's own; it decides with that whether the scene is moved nearer to the origin.
 ///
 /// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
 pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<BitterliScene, SourceError> {
@@ -140,8 +140,8 @@ fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
     folder.map_or_else(|| "scene".to_owned(), |name| shortened(&name.to_string_lossy()))
 }
 
-/// Reads all elements directly below `<scene>`. Fails where none of them is a usable sensor. `place` is that of the camera
-/// that will be used instead.
+/// Reads all elements directly below `<scene>`. Fails where none of them is a usable sensor. `place` is that of the
+/// camera that will be used instead.
 fn read_elements<'a>(
     reader: &mut Reader<'a>,
     document: &'a Document,
@@ -180,8 +180,8 @@ fn read_elements<'a>(
     Ok(if reader.shift_m == DVec3::ZERO { camera } else { camera.moved(-reader.shift_m) })
 }
 
-/// Reports BSDFs that no shape uses. One of them can be a `bumpmap` around the BSDF that has the id: references resolve to
-/// the element with the id, so such bumps do not show in Mitsuba either.
+/// Reports BSDFs that no shape uses. One of them can be a `bumpmap` around the BSDF that has the id: references resolve
+/// to the element with the id, so such bumps do not show in Mitsuba either.
 fn report_unused(reader: &mut Reader, document: &Document) {
     for element in document.root.children.iter().filter(|e| e.tag == "bsdf") {
         if reader.materials.contains_key(&element.serial) {

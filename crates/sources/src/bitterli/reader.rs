@@ -1,5 +1,5 @@
-//! The state that all parts of the reader share, and the parameters of one plugin: numbers, vectors and transforms. A plugin
-//! takes the parameters that it knows by name; the others are reported at the end.
+//! The state that all parts of the reader share, and the parameters of one plugin: numbers, vectors and transforms. A
+//! plugin takes the parameters that it knows by name; the others are reported at the end.
 
 use std::collections::BTreeMap;
 
@@ -65,7 +65,8 @@ impl<'a> Reader<'a> {
         Ok(found.find(|file| self.source.contains(file)).unwrap_or(own))
     }
 
-    /// Reports that the file `name` could not be used. The finding names that file where the name is valid, else the XML.
+    /// Reports that the file `name` could not be used. The finding names that file where the name is valid, else the
+    /// XML.
     pub(super) fn report_file(&mut self, name: &str, place: &str, line: usize, fault: &FileFault, action: &str) {
         let about = SourceFolder::relative(name).unwrap_or_else(|_| self.log.file().to_owned());
         let message = format!("{} (named in '{}' line {line})", fault.message, self.log.file());
@@ -342,8 +343,8 @@ enum StepError {
     UpAlongView,
 }
 
-/// The product of a transform's steps, each applied after those before it. A transform with a faulty step gives none and is a finding with this `action`: without
-/// that step, it would put its object elsewhere.
+/// The product of a transform's steps, each applied after those before it. A transform with a faulty step gives none
+/// and is a finding with this `action`: without that step, it would put its object elsewhere.
 pub(super) fn read_transform(transform: &Element, place: &str, action: &str, log: &mut Log) -> Option<DMat4> {
     if transform.tag != "transform" {
         let tag = shortened(&transform.tag);

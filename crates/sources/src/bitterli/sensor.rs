@@ -8,7 +8,8 @@ use super::document::{BitterliError, Element, ValueError};
 use super::reader::{Parameters, Reader, number};
 use crate::source_scene::Log;
 
-/// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six digits.
+/// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six
+/// digits.
 const SKEW_WITHOUT_FINDING: f64 = 1e-4;
 
 /// Mitsuba's focal length of a sensor that states none.
@@ -22,7 +23,8 @@ struct Film {
 }
 
 impl<'a> Reader<'a> {
-    /// The camera of the sensor `element`. Fails where it is no perspective camera or its `to_world` is faulty or singular.
+    /// The camera of the sensor `element`. Fails where it is no perspective camera or its `to_world` is faulty or
+    /// singular.
     pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, BitterliError> {
         let mut from = self.parameters(element, element.place());
         match element.kind() {
@@ -139,8 +141,8 @@ fn intrinsics(film: &Film, fov_x: f64, principal: [f64; 2]) -> Intrinsics {
     }
 }
 
-/// A camera with the position and direction of view of a sensor's matrix, and its up vector as far as it is perpendicular
-/// to the direction. None where the matrix is singular.
+/// A camera with the position and direction of view of a sensor's matrix, and its up vector as far as it is
+/// perpendicular to the direction. None where the matrix is singular.
 fn camera(world_from_sensor: DMat4, intrinsics: Intrinsics, place: &str, log: &mut Log) -> Option<Camera> {
     let sensor = DMat3::from_mat4(world_from_sensor);
     let back = (-sensor.z_axis).try_normalize()?;

@@ -109,8 +109,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The shape's triangles in world space. A shape without triangles, or one that exceeds a limit, is reported and gives
-    /// none.
+    /// The shape's triangles in world space. A shape without triangles, or one that exceeds a limit, is reported and
+    /// gives none.
     fn mesh(
         &mut self,
         element: &'a Element,

@@ -437,7 +437,8 @@ fn textures_are_decoded_shared_and_turned_upright() {
     assert_eq!(scene.textures[0].texture.sample(lower_left.to_array()), [1.0, 0.0, 0.0]);
 }
 
-/// A shape's textured radiance is 1 times the texture, looked up like a material's. An environment's is the texture's mean.
+/// A shape's textured radiance is 1 times the texture, looked up like a material's. An environment's is the texture's
+/// mean.
 #[test]
 fn a_texture_as_radiance() {
     let texture = "<texture name='radiance' type='bitmap'><string name='filename' value='a b.png'/>\

@@ -42,8 +42,8 @@ impl<'a> Reader<'a> {
         self.color_bitmap(element, from, name)
     }
 
-    /// The bitmap `element`, which is the parameter `name`, as a colour. One that cannot be read is reported and becomes
-    /// mid-grey.
+    /// The bitmap `element`, which is the parameter `name`, as a colour. One that cannot be read is reported and
+    /// becomes mid-grey.
     pub(super) fn color_bitmap(&mut self, element: &'a Element, from: &mut Parameters<'a>, name: &str) -> ColorInput {
         let read = self.bitmap(element, &from.place).and_then(|bitmap| {
             if bitmap.channel.is_some() {
@@ -79,8 +79,8 @@ impl<'a> Reader<'a> {
 
     /// Takes the opacity `name`: the alpha channel of a picture whose alpha is not 1 everywhere, else its luminance.
     ///
-    /// Mitsuba always takes the luminance and ignores alpha, which makes the white background of a cut-out leaf opaque and
-    /// the leaf half transparent. The scenes were converted from a renderer that takes alpha.
+    /// Mitsuba always takes the luminance and ignores alpha, which makes the white background of a cut-out leaf opaque
+    /// and the leaf half transparent. The scenes were converted from a renderer that takes alpha.
     pub(super) fn opacity(&mut self, from: &mut Parameters<'a>, name: &str) -> Option<ScalarInput> {
         let Some(element) = from.take(&[name]) else { return Some(ScalarInput::Constant(0.5)) };
         if element.tag != "texture" {
@@ -91,8 +91,8 @@ impl<'a> Reader<'a> {
         self.scalar_texture(element, &from.place, true)
     }
 
-    /// A number from a texture: its alpha where `prefer_alpha` holds and that is not 1 everywhere, else its luminance. None
-    /// where it cannot be read.
+    /// A number from a texture: its alpha where `prefer_alpha` holds and that is not 1 everywhere, else its luminance.
+    /// None where it cannot be read.
     pub(super) fn scalar_texture(
         &mut self,
         element: &'a Element,
@@ -207,8 +207,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Mitsuba's v grows downwards in the picture (it flips the vt of an OBJ on loading), MatEval's grows upwards, so each is
-    /// 1 minus the other.
+    /// Mitsuba's v grows downwards in the picture (it flips the vt of an OBJ on loading), MatEval's grows upwards, so
+    /// each is 1 minus the other.
     fn uv_transform(&mut self, from: &mut Parameters<'a>) -> UvTransform {
         let m = from.transform("to_uv", &mut self.log);
         let number = |from: &mut Parameters<'a>, name, default, log: &mut _| from.number(name, log).unwrap_or(default);

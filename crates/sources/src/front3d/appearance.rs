@@ -112,9 +112,9 @@ impl Appearances {
         (index, plain)
     }
 
-    /// Whether a material of the house states its base colour: by a texture that could be read, or by a colour. The colour
-    /// of a material whose texture is lost is the white that the texture multiplies; it counts only where the maker has
-    /// given no textures at all.
+    /// Whether a material of the house states its base colour: by a texture that could be read, or by a colour. The
+    /// colour of a material whose texture is lost is the white that the texture multiplies; it counts only where the
+    /// maker has given no textures at all.
     pub(super) fn states_color(&self, source: &HouseMaterial, index: MaterialIndex, has_textures: bool) -> bool {
         let MaterialModel::Principled { base_color, .. } = self.materials[index.0].model else { return false };
         let is_lost = has_textures && source.texture.is_some();

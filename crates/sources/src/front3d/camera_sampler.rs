@@ -1,8 +1,8 @@
 //! Draws cameras in a room until one keeps its distance from everything and sees enough of the room.
 //!
-//! Height and pitch are uniform, the position is uniform over the floor's bounding box and must be above the floor, and ten
-//! by ten rays decide on the distances and on a score of what is seen. Which heights, distances and scores are wanted is
-//! stated by [`SamplerRules`].
+//! Height and pitch are uniform, the position is uniform over the floor's bounding box and must be above the floor, and
+//! ten by ten rays decide on the distances and on a score of what is seen. Which heights, distances and scores are
+//! wanted is stated by [`SamplerRules`].
 
 use std::collections::BTreeMap;
 
@@ -216,8 +216,8 @@ impl<'a> RoomSampler<'a> {
         Some(DVec3::new(above.x, lifted, above.z))
     }
 
-    /// The distance to the nearest surface that a dense grid of rays meets, since table edges and lamps fit between ten by
-    /// ten rays. It is expensive and so checked late.
+    /// The distance to the nearest surface that a dense grid of rays meets, since table edges and lamps fit between ten
+    /// by ten rays. It is expensive and so checked late.
     fn nearest_by_dense_rays(&self, view: &Camera) -> f64 {
         let met = grid(&view.intrinsics, DENSE_GRID).filter_map(|place| {
             let hit = hit_through(self.world, view, place)?;
@@ -226,8 +226,8 @@ impl<'a> RoomSampler<'a> {
         met.fold(f64::INFINITY, f64::min)
     }
 
-    /// The surfaces that ten by ten rays meet and their distances; none for a ray that leaves the house. Fails where a ray
-    /// does and must not, and where all do.
+    /// The surfaces that ten by ten rays meet and their distances; none for a ray that leaves the house. Fails where a
+    /// ray does and must not, and where all do.
     fn rays(&self, camera: &Camera, rules: &SamplerRules) -> Result<Vec<Option<(usize, f64)>>, Refusal> {
         let met = |place: DVec2| {
             let hit: PixelHit = hit_through(self.world, camera, place)?;
@@ -279,10 +279,10 @@ fn grid(intrinsics: &Intrinsics, side: usize) -> impl Iterator<Item = DVec2> + u
 
 /// BlenderProc's coverage score of the surfaces that the rays of [`score_grid`] meet.
 ///
-/// It is the product of three factors: the mean weight of the rays, which is 10 for chairs, sofas, tables and beds, 0 for
-/// a ray that meets nothing, `architecture_weight` for walls and the like, and 1 otherwise; a third of the number of
-/// different kinds, where walls and floors are kinds too; and the product over all kinds of one minus the kind's fraction
-/// of the rays.
+/// It is the product of three factors: the mean weight of the rays, which is 10 for chairs, sofas, tables and beds, 0
+/// for a ray that meets nothing, `architecture_weight` for walls and the like, and 1 otherwise; a third of the number
+/// of different kinds, where walls and floors are kinds too; and the product over all kinds of one minus the kind's
+/// fraction of the rays.
 ///
 /// The fork 3dlg-hcvc/BlenderProc-3DFront multiplies the mean weight by the entropy, in bits, of the hits by instance,
 /// without those of weight 0.

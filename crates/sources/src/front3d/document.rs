@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use crate::source_scene::JsonSize;
 
-/// Limits on an untrusted house, checked before memory is taken. A house that exceeds them is refused; a model or texture that does is a finding.
+/// Limits on an untrusted house, checked before memory is taken. A house that exceeds them is refused; a model or
+/// texture that does is a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of a house's JSON. The largest known house has a twentieth of it.

@@ -1,5 +1,5 @@
-//! Reads a whole house into world space, room by room: the architecture, grouped by mesh type and material, and every piece
-//! whose model is public.
+//! Reads a whole house into world space, room by room: the architecture, grouped by mesh type and material, and every
+//! piece whose model is public.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -274,8 +274,8 @@ impl Furnisher<'_> {
         Some(Finish::uniform(class, 1 + parts.iter().max().copied().unwrap_or(0)))
     }
 
-    /// What the data states of a surface. It has no roughness and metallic; those of a rule are stated by the recipe. Only
-    /// lights emit.
+    /// What the data states of a surface. It has no roughness and metallic; those of a rule are stated by the recipe.
+    /// Only lights emit.
     fn stated(&self, base_color: bool) -> StatedParameters {
         let by_rule = self.appearances.rule != AppearanceRule::Constant;
         StatedParameters { base_color, roughness: by_rule, metallic: by_rule, emission: true }

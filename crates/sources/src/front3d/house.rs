@@ -1,5 +1,5 @@
-//! The checked content of a 3D-FRONT house's JSON: its rooms, what they contain, and where. Every key of the JSON may be
-//! missing, repeated or of the wrong type; repairs are findings.
+//! The checked content of a 3D-FRONT house's JSON: its rooms, what they contain, and where. Every key of the JSON may
+//! be missing, repeated or of the wrong type; repairs are findings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -470,7 +470,8 @@ fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
     all.iter().enumerate().filter_map(camera).collect()
 }
 
-/// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; none where one of them is missing or faulty.
+/// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; none where one of them is missing or
+/// faulty.
 fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     let (position, target) = (numbers::<3>(record, "pos")?, numbers::<3>(record, "target")?);
     let fov_y_deg = record.get("fov").and_then(super::document::number).filter(|fov| (1.0..179.0).contains(fov))?;
@@ -481,8 +482,8 @@ fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
 /// The path of a file, as findings give it, and its SHA-256.
 type PathAndHash = (String, String);
 
-/// The cameras from the file `beside` the house, relative to `root`. Without such a file, or where it has none for this house, those from the
-/// house's JSON. Sorted by number. Returns the path and the hash of the file too, if it was read.
+/// The cameras from the file `beside` the house, relative to `root`. Without such a file, or where it has none for this
+/// house, those from the house's JSON. Sorted by number. Returns the path and the hash of the file too, if it was read.
 pub(super) fn designer_cameras(
     house: &House,
     root: &Path,

@@ -33,8 +33,8 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<(Triangle
     Some((mesh.picked(|_| true), base))
 }
 
-/// The numbers at `key`. Anything else is read as NaN, which is handled with the numbers that are not finite; the first such
-/// entry is reported. A null is what JSON has for NaN.
+/// The numbers at `key`. Anything else is read as NaN, which is handled with the numbers that are not finite; the first
+/// such entry is reported. A null is what JSON has for NaN.
 fn numbers(from: &Value, key: &str, place: &str, log: &mut Log) -> Vec<f64> {
     let all = list(from, key);
     let is_other = |value: &&Value| !value.is_null() && number(value).is_none();

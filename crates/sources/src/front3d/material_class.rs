@@ -1,5 +1,6 @@
-//! The class of material of a model, of its groups, and of architecture, from what the data states; the table of classes,
-//! with their ranges of roughness; and the classes over one surface, whose material is one for all of its triangles.
+//! The class of material of a model, of its groups, and of architecture, from what the data states; the table of
+//! classes, with their ranges of roughness; and the classes over one surface, whose material is one for all of its
+//! triangles.
 //!
 //! A model has one texture for all of its groups, and a surface has one material. Where groups have different classes,
 //! roughness and metallic are a texture with a block of texels for each class, and the uv of the triangles of class k

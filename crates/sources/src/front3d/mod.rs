@@ -1,9 +1,9 @@
 //! Reads 3D-FRONT: houses as JSON in three releases, their furniture from 3D-FUTURE, and their textures.
 //!
-//! The inputs are the path of a house and the folders of models and textures. The output is a [`FurnishedHouse`] in world
-//! space, and a [`SourceScene`](crate::source_scene::SourceScene) for one of its rooms and the views of a camera. The data
-//! has many faults and most of its keys are optional, so everything that is missing or repaired is a finding with its JSON
-//! pointer. An error means that the file is not a house.
+//! The inputs are the path of a house and the folders of models and textures. The output is a [`FurnishedHouse`] in
+//! world space, and a [`SourceScene`](crate::source_scene::SourceScene) for one of its rooms and the views of a camera.
+//! The data has many faults and most of its keys are optional, so everything that is missing or repaired is a finding
+//! with its JSON pointer. An error means that the file is not a house.
 //!
 //! The steps:
 //! - `document` parses the JSON within limits; `house` and `house_mesh` turn it into a [`House`] with its designers'

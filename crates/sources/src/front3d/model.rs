@@ -125,8 +125,8 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
     Some(Model { part_of_triangle, mesh: Arc::new(mesh), group_of_triangle: groups, groups: names, finish: None })
 }
 
-/// Drops groups named after a shadow: flat pictures on the floor that falsify a model's size (3D-FRONT-ToolBox issue 7).
-/// Returns the group of each remaining triangle too.
+/// Drops groups named after a shadow: flat pictures on the floor that falsify a model's size (3D-FRONT-ToolBox issue
+/// 7). Returns the group of each remaining triangle too.
 fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, Vec<usize>) {
     let ObjMesh { mut mesh, groups, .. } = read;
     let (mut triangles, mut kept, mut first) = (Vec::new(), Vec::new(), 0);
@@ -222,17 +222,18 @@ fn longest_side(mesh: &TriangleMesh) -> f32 {
     (high - low).max_element()
 }
 
-/// The largest height above the model's lowest point, in metres. Models stand on y = 0 to within 4 mm, and their shadows are
-/// lower than all else.
+/// The largest height above the model's lowest point, in metres. Models stand on y = 0 to within 4 mm, and their
+/// shadows are lower than all else.
 const LEVEL_M: f32 = 1e-3;
-/// The smallest share of the footprint of everything else that the shadow covers. Shadows of the data cover all of it, and
-/// feet a tenth.
+/// The smallest share of the footprint of everything else that the shadow covers. Shadows of the data cover all of it,
+/// and feet a tenth.
 const LEAST_COVER: f64 = 0.5;
 /// Texels with no larger value in any channel, of 0 to 1 in the file, are black. Those of the data are 0.
 const BLACK: f32 = 4.0 / 255.0;
 /// Texels with no larger opacity are translucent. Those of the data have up to 193 of 255.
 const TRANSLUCENT: f32 = 200.0 / 255.0;
-/// The least mean opacity. Texels without any are an unused part of the texture, or a texture whose opacity says nothing.
+/// The least mean opacity. Texels without any are an unused part of the texture, or a texture whose opacity says
+/// nothing.
 const LEAST_OPACITY: f32 = 1.0 / 255.0;
 /// The share of places that must be black and translucent; the others may lie on the border of a neighbouring field.
 const LEAST_SHARE: f32 = 0.95;
@@ -242,8 +243,8 @@ const PLACES: usize = 32;
 /// The triangles of `mesh`, in metres with +y up, that are a painted shadow; none in most models.
 ///
 /// Of the models of later releases 11 % contain a few horizontal triangles at their lowest height, across the whole
-/// footprint, whose texels are black and translucent: a picture of a shadow. Placed on a floor they lie in it exactly. Read
-/// as a surface, they are a black sheet, or speckles, depending on the renderer.
+/// footprint, whose texels are black and translucent: a picture of a shadow. Placed on a floor they lie in it exactly.
+/// Read as a surface, they are a black sheet, or speckles, depending on the renderer.
 ///
 /// `texels` holds the colours of the model's texture as its file states them, 0 to 1, and `opacity` its opacity.
 fn drop_shadow(mesh: &TriangleMesh, texels: &Texture, opacity: &Texture) -> Vec<usize> {
@@ -420,8 +421,8 @@ mod tests {
 
     use super::*;
 
-    /// A box from 10 to 50 cm above a horizontal square of `side` at `height`, with the texture's left half on the box and
-    /// the right half on the square.
+    /// A box from 10 to 50 cm above a horizontal square of `side` at `height`, with the texture's left half on the box
+    /// and the right half on the square.
     fn boxed(side: f32, height: f32) -> TriangleMesh {
         let corner = |x: f32, y: f32, z: f32| Vec3::new(x - 0.5, y, z - 0.5);
         let mut positions = Vec::new();

@@ -1,6 +1,6 @@
-//! Makes a scene of one room of a house: its architecture and furniture, what the views see of other rooms, and its lights,
-//! as BlenderProc sets them: ceilings and lamps emit although the camera sees their ordinary surface, and a grey environment
-//! surrounds the house.
+//! Makes a scene of one room of a house: its architecture and furniture, what the views see of other rooms, and its
+//! lights, as BlenderProc sets them: ceilings and lamps emit although the camera sees their ordinary surface, and a
+//! grey environment surrounds the house.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,8 +24,8 @@ const LONGEST_NAME: usize = 40;
 
 /// The scene of room number `room`, seen from `views`, the input view first. `world` was made of `house.scene`.
 ///
-/// Where a view sees another room, all of that room's architecture is kept, since its ceiling emits, and the furniture that
-/// is seen. The rest of the house is left out.
+/// Where a view sees another room, all of that room's architecture is kept, since its ceiling emits, and the furniture
+/// that is seen. The rest of the house is left out.
 pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[Camera]) -> SourceScene {
     let kept = kept(house, room, &seen(world, views));
     let names = names(house, room, &kept);
@@ -107,8 +107,8 @@ fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usiz
     (0..house.placed.len()).filter(is_kept).collect()
 }
 
-/// Names of the kept surfaces: the house's own, with the room's id in front for other rooms. A number makes repeated names
-/// unique, also once they are turned into ids. No name is that of the environment's light.
+/// Names of the kept surfaces: the house's own, with the room's id in front for other rooms. A number makes repeated
+/// names unique, also once they are turned into ids. No name is that of the environment's light.
 fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
     let mut taken = BTreeSet::from([id_text_from(WORLD_NAME, "")]);
     let mut count: BTreeMap<String, usize> = BTreeMap::new();
@@ -182,8 +182,8 @@ fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
     }
 }
 
-/// The light groups of the house's surfaces `kept`, which are the surfaces of `scene` in this order. As in Blender, both
-/// sides emit.
+/// The light groups of the house's surfaces `kept`, which are the surfaces of `scene` in this order. As in Blender,
+/// both sides emit.
 fn light_groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) -> Vec<LightGroup> {
     let mut groups: Vec<LightGroup> = Vec::new();
     let mut ceilings: Vec<((usize, [f32; 3]), usize)> = Vec::new();

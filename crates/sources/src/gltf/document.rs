@@ -1,6 +1,6 @@
-//! A glTF parsed within limits on memory, with its buffers and the files that it names. It is refused where it requires an
-//! unknown extension, by its own statement or because its meshes exist in a compressed form alone. Places are JSON pointers
-//! (RFC 6901).
+//! A glTF parsed within limits on memory, with its buffers and the files that it names. It is refused where it requires
+//! an unknown extension, by its own statement or because its meshes exist in a compressed form alone. Places are JSON
+//! pointers (RFC 6901).
 
 use gltf::json::validation;
 use mateval_image::limits::without_mark;
@@ -13,8 +13,8 @@ use serde_json::Value;
 
 use crate::source_scene::JsonSize;
 
-/// Limits on an untrusted glTF, checked before memory is taken. The file is refused where its JSON or its buffers exceed them; anything else is left out, which is a
-/// finding.
+/// Limits on an untrusted glTF, checked before memory is taken. The file is refused where its JSON or its buffers
+/// exceed them; anything else is left out, which is a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of the glTF, of any other file, and of all buffers together.

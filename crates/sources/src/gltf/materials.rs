@@ -1,6 +1,6 @@
 //! Materials: metallic-roughness as Blender's principled, specular-glossiness converted to it
-//! (`KHR_materials_pbrSpecularGlossiness`, which writers used before 2021), glass by `KHR_materials_transmission`, alpha
-//! modes, emission.
+//! (`KHR_materials_pbrSpecularGlossiness`, which writers used before 2021), glass by `KHR_materials_transmission`,
+//! alpha modes, emission.
 
 use gltf::material::{AlphaMode, PbrSpecularGlossiness};
 use mateval_image::texture_io::Encoding;
@@ -80,7 +80,8 @@ impl Reader<'_> {
         read
     }
 
-    /// What the file states of a material. A primitive without a material has the format's default, which states nothing.
+    /// What the file states of a material. A primitive without a material has the format's default, which states
+    /// nothing.
     fn stated(&self, material: &gltf::Material<'_>) -> StatedParameters {
         let nothing = StatedParameters { base_color: false, roughness: false, metallic: false, emission: false };
         material.index().and_then(|index| self.file.stated.get(index)).copied().unwrap_or(nothing)

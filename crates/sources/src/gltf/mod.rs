@@ -6,8 +6,8 @@
 //! JSON pointers. An error means that there is no scene to read.
 //!
 //! `document` parses the JSON within limits and reads the binary data. `nodes` walks the tree of the default scene and
-//! reads its triangles and camera, `materials` and `textures` the surfaces, `punctual` the lights. `reader` is the state
-//! that they share, and counts what is not represented.
+//! reads its triangles and camera, `materials` and `textures` the surfaces, `punctual` the lights. `reader` is the
+//! state that they share, and counts what is not represented.
 
 mod document;
 mod materials;
@@ -57,8 +57,8 @@ pub struct GltfScene {
     pub absent_files: Vec<String>,
 }
 
-/// Reads the default scene, or else the first scene, of the glTF at `path`. `camera` is the place of the camera that will
-/// be used instead of the file's own; it decides with that whether the scene is moved nearer to the origin.
+/// Reads the default scene, or else the first scene, of the glTF at `path`. `camera` is the place of the camera that
+/// will be used instead of the file's own; it decides with that whether the scene is moved nearer to the origin.
 ///
 /// Fails where the file or one of its buffers cannot be read, the JSON is not valid glTF, breaks `limits` or requires
 /// an unknown extension, or the file has no scene.

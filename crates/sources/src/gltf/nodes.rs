@@ -1,5 +1,5 @@
-//! The nodes of a scene: each mesh of a node becomes an instance for each of its materials, with its primitives as parts,
-//! and the first camera that can be used becomes the scene's.
+//! The nodes of a scene: each mesh of a node becomes an instance for each of its materials, with its primitives as
+//! parts, and the first camera that can be used becomes the scene's.
 
 use std::collections::BTreeSet;
 
@@ -32,7 +32,8 @@ const HEIGHTS: std::ops::RangeInclusive<f64> = 16.0..=8192.0;
 
 /// Vertical fields of view in radians that a camera may have.
 const FIELDS: std::ops::RangeInclusive<f64> = 1e-3..=3.1;
-/// Farthest that a camera may stand from the origin along an axis, in metres: there, 64 bits are exact to 0.1 micrometres.
+/// Farthest that a camera may stand from the origin along an axis, in metres: there, 64 bits are exact to 0.1
+/// micrometres.
 const FARTHEST_M: f64 = 1e9;
 
 /// The primitives of a node that share a material, as one mesh.
@@ -143,7 +144,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The transforms of `EXT_mesh_gpu_instancing`, at least one. Absent attributes have the format's defaults: no motion.
+    /// The transforms of `EXT_mesh_gpu_instancing`, at least one. Absent attributes have the format's defaults: no
+    /// motion.
     fn instances(&self, extension: &Value) -> Result<Vec<DMat4>, GltfError> {
         let attribute = |key: &str| {
             let index = extension.pointer(&format!("/attributes/{key}")).and_then(Value::as_u64);

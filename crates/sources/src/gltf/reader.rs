@@ -1,5 +1,5 @@
-//! The state that all parts of the reader share: the file, the scene under construction, its findings, and the features that
-//! it cannot represent, counted by kind: one finding a kind, however often it occurs.
+//! The state that all parts of the reader share: the file, the scene under construction, its findings, and the features
+//! that it cannot represent, counted by kind: one finding a kind, however often it occurs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,8 +43,8 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Counts a feature at a JSON pointer that the scene cannot represent. `feature` begins a sentence that ends in "not
-    /// represented", and `action` states what is done instead.
+    /// Counts a feature at a JSON pointer that the scene cannot represent. `feature` begins a sentence that ends in
+    /// "not represented", and `action` states what is done instead.
     pub(super) fn omit(&mut self, omission: Omission, feature: &str, action: &str, pointer: &str) {
         let first = || Occurrences { count: 0, first: pointer.to_owned(), action: action.to_owned() };
         self.omitted.entry((omission, feature.to_owned())).or_insert_with(first).count += 1;
@@ -57,8 +57,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Adds a light, unless there are as many as the limit allows, which is reported. Returns whether it was added. A number
-    /// makes its name unique.
+    /// Adds a light, unless there are as many as the limit allows, which is reported. Returns whether it was added. A
+    /// number makes its name unique.
     pub(super) fn add_light(&mut self, name: &str, emission: Emission, camera_visible: bool, pointer: &str) -> bool {
         if self.scene.lights.len() >= self.limits.lights {
             let feature = format!("lights beyond {}", self.limits.lights);

@@ -1,5 +1,5 @@
-//! Textures: images of the file, decoded once for each use, with the factors of materials multiplied in, and how they are
-//! looked up.
+//! Textures: images of the file, decoded once for each use, with the factors of materials multiplied in, and how they
+//! are looked up.
 
 use std::path::Path;
 

@@ -51,7 +51,8 @@ pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
     Ok(Opened { root: root_of(folder.path()), _unpacked: Some(folder) })
 }
 
-/// The first block of a tar, whose magic is `ustar` at [`TAR_MAGIC_AT`] (POSIX.1-2017, pax, "ustar Interchange Format").
+/// The first block of a tar, whose magic is `ustar` at [`TAR_MAGIC_AT`] (POSIX.1-2017, pax, "ustar Interchange
+/// Format").
 const START_BYTES: u64 = 512;
 const TAR_MAGIC_AT: usize = 257;
 

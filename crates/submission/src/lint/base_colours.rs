@@ -1,5 +1,5 @@
-//! Base colours compared with the input picture: turned atlases, exchanged channels, numbers that were encoded or decoded
-//! once too often, light and shadow baked in.
+//! Base colours compared with the input picture: turned atlases, exchanged channels, numbers that were encoded or
+//! decoded once too often, light and shadow baked in.
 
 use mateval_image::LinearRgb;
 use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
@@ -65,11 +65,11 @@ const LEAST_HUE: f64 = 0.1;
 const LEAST_EXCHANGED: f64 = 0.5;
 /// The least correlation of hues with the picture from which their strength is judged.
 const LEAST_HUE_CORRELATION: f64 = 0.8;
-/// The factor by which the hues of base colours are stronger than those of the picture, since all surfaces reflect some white
-/// light off their facets. On the built-in scenes the truth's is 1.23 to 1.26.
+/// The factor by which the hues of base colours are stronger than those of the picture, since all surfaces reflect some
+/// white light off their facets. On the built-in scenes the truth's is 1.23 to 1.26.
 const PALER_PICTURE: f64 = 1.2;
-/// Hues stronger or weaker than expected by this factor are decoded wrongly. Up to 2.2 is expected then (1.56 on a built-in
-/// scene, whose strongest hues are too dark to count), 1 otherwise.
+/// Hues stronger or weaker than expected by this factor are decoded wrongly. Up to 2.2 is expected then (1.56 on a
+/// built-in scene, whose strongest hues are too dark to count), 1 otherwise.
 const LEAST_FACTOR: f64 = 1.45;
 /// Darker values hold more noise and rounding than hue.
 const DARKEST_HUE: f32 = 0.01;
@@ -187,8 +187,8 @@ struct Typical {
     deviation: f64,
 }
 
-/// Over the truth and its baselines (lifted, medians, procedural, of the truth and of de-lit pictures) of eleven rooms: the
-/// built-in sample, six rooms of two 3D-FRONT houses, and three of Bitterli's scenes, at 96x72 and 320x240 pixels.
+/// Over the truth and its baselines (lifted, medians, procedural, of the truth and of de-lit pictures) of eleven rooms:
+/// the built-in sample, six rooms of two 3D-FRONT houses, and three of Bitterli's scenes, at 96x72 and 320x240 pixels.
 const BRIGHTNESS: Typical = Typical { mean: -1.38, deviation: 0.37 };
 const SLOPE: Typical = Typical { mean: -0.18, deviation: 0.23 };
 /// Numbers further from [`Typical::mean`] count as this number of deviations. So a number that is typical in another
@@ -218,22 +218,22 @@ impl Reading {
     }
 }
 
-/// The two numbers of a scene in each of [`Reading::ALL`]. They reveal base colours that were encoded or decoded once too
-/// often, in files of any kind, by comparison with typical rooms.
+/// The two numbers of a scene in each of [`Reading::ALL`]. They reveal base colours that were encoded or decoded once
+/// too often, in files of any kind, by comparison with typical rooms.
 ///
-/// If a method's pictures hold sRGB numbers and are lifted as if they were linear, or the reverse, all maps are valid and
-/// far too bright or too dark. [`decoding`] compares hues and names the kind of file that was written wrongly. This
+/// If a method's pictures hold sRGB numbers and are lifted as if they were linear, or the reverse, all maps are valid
+/// and far too bright or too dark. [`decoding`] compares hues and names the kind of file that was written wrongly. This
 /// check compares brightness, so that the kind of file does not matter and rooms without strong hues are judged too.
 ///
 /// - The mean of ln(luminance). Few surfaces of a room are nearly black or nearly white: for rooms that are lit by
 ///   electric light EN 12464-1 recommends reflectances of 0.7 to 0.9 for ceilings, 0.5 to 0.8 for walls, 0.2 to 0.7 for
 ///   furniture and 0.2 to 0.4 for floors. Encoding turns 0.3 into 0.58, and decoding turns it into 0.07.
-/// - The slope of ln(picture) over ln(base colour), pixel by pixel. It is near 1, because light hardly depends on the base
-///   colour that it falls on, and a little less, because glossy reflections brighten dark surfaces most. Encoding is close
-///   to a power of 1 / 2.2 and doubles the slope; decoding halves it. Noise in the picture does not change it.
+/// - The slope of ln(picture) over ln(base colour), pixel by pixel. It is near 1, because light hardly depends on the
+///   base colour that it falls on, and a little less, because glossy reflections brighten dark surfaces most. Encoding
+///   is close to a power of 1 / 2.2 and doubles the slope; decoding halves it. Noise in the picture does not change it.
 ///
-/// The better a reading fits rooms, the larger its log-likelihood under two normal distributions. Either number may be far
-/// off for another reason: the input picture as base colour is as dark as its exposure, and a poor estimate has too
+/// The better a reading fits rooms, the larger its log-likelihood under two normal distributions. Either number may be
+/// far off for another reason: the input picture as base colour is as dark as its exposure, and a poor estimate has too
 /// little contrast. So neither suffices for a warning without the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Readings {
@@ -289,8 +289,8 @@ fn against_photo(looks: &[Look], reading: Reading) -> Pairs {
     pairs
 }
 
-/// A finding if the base colours of the whole submission are clearly closer to rooms in another reading. Numbers are means
-/// over scenes: a wrong script is wrong in all of them, and the peculiarities of single rooms cancel.
+/// A finding if the base colours of the whole submission are clearly closer to rooms in another reading. Numbers are
+/// means over scenes: a wrong script is wrong in all of them, and the peculiarities of single rooms cancel.
 pub(super) fn untypical_encoding(scenes: &[Readings]) -> Option<Finding> {
     let pixels: usize = scenes.iter().map(|scene| scene.pixels).sum();
     let brightness = means(scenes.iter().filter_map(|scene| scene.brightness))?;
@@ -378,8 +378,8 @@ mod tests {
     /// Reflectances of white paint, a grey wall, wood, cloth and black plastic.
     const SURFACES: [f32; 5] = [0.75, 0.5, 0.3, 0.12, 0.05];
 
-    /// A room of 40 surfaces under light that varies by a factor of 4, seen in 4000 pixels; `write` makes the base colour
-    /// of a reflectance and of the picture.
+    /// A room of 40 surfaces under light that varies by a factor of 4, seen in 4000 pixels; `write` makes the base
+    /// colour of a reflectance and of the picture.
     fn room(write: impl Fn(f32, f32) -> f32) -> Vec<Look> {
         let look = |at: usize| {
             let light = 0.5 * libm::exp2f((number(3, at as u64) >> 40) as f32 / (1 << 23) as f32);

@@ -279,9 +279,9 @@ fn fill(texels: &[CoarseTexel], base_color: &Texture) -> Fill {
     fill
 }
 
-/// A finding where one colour fills the area that the input picture does not show, and only that: the submission leaves it
-/// empty, although it is scored like the rest. Instances that are observed nowhere or
-/// everywhere do not count: for the former, a single colour is a legitimate answer.
+/// A finding where one colour fills the area that the input picture does not show, and only that: the submission leaves
+/// it empty, although it is scored like the rest. Instances that are observed nowhere or everywhere do not count: for
+/// the former, a single colour is a legitimate answer.
 fn left_empty<'a>(place: &str, fills: impl Iterator<Item = &'a Fill>) -> Option<Finding> {
     let mut by_value: BTreeMap<Bits, [f64; 2]> = BTreeMap::new();
     let mut all = [0.0; 2];
@@ -350,8 +350,8 @@ fn equal_texels(map: &Texture, truth: &Texture) -> bool {
         })
 }
 
-/// A note where most of a scene's maps are the truth's. A copy is not a fault, as the baseline `gt` shows, but a ranking
-/// must not hide it.
+/// A note where most of a scene's maps are the truth's. A copy is not a fault, as the baseline `gt` shows, but a
+/// ranking must not hide it.
 fn copies(place: &str, instances: impl Iterator<Item = CopyCount>) -> Option<Finding> {
     let CopyCount { copies, of } = instances.fold(CopyCount::default(), |sum, count| CopyCount {
         copies: sum.copies + count.copies,

@@ -76,8 +76,8 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
     }
 }
 
-/// The folder below a submission that holds its `submission.json`, or an archive that may; absent if neither exists. The
-/// first in the order of names, at most four folders down.
+/// The folder below a submission that holds its `submission.json`, or an archive that may; absent if neither exists.
+/// The first in the order of names, at most four folders down.
 fn elsewhere(submission: &Path) -> Option<String> {
     const MOST: usize = 1000;
     let mut folders = vec![(submission.to_owned(), String::new())];
@@ -201,8 +201,8 @@ pub fn check_method_name(name: &str, severity: Severity, file: &str) -> Option<F
     found("bad_method_name", message, format!("use at most {LONGEST_METHOD_NAME} printable characters"))
 }
 
-/// Whether the character shows nothing by itself: two names that differ only in such characters look the same, and those
-/// that set the direction of writing reorder the text around the name.
+/// Whether the character shows nothing by itself: two names that differ only in such characters look the same, and
+/// those that set the direction of writing reorder the text around the name.
 fn is_unprintable(c: char) -> bool {
     let is_ignorable = matches!(c,
         '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}' | '\u{180b}'..='\u{180f}'

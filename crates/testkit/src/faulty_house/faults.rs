@@ -246,7 +246,8 @@ fn damage_texture(house: &House, name: &str, path: &Path) {
     }
 }
 
-/// The opacity of a painted shadow. As in the data: 40 to 51 nearly everywhere, less at the edge, more under the middle.
+/// The opacity of a painted shadow. As in the data: 40 to 51 nearly everywhere, less at the edge, more under the
+/// middle.
 fn shadow_opacity(u: f64, v: f64) -> u8 {
     let edge = u.min(1.0 - u).min(v.min(1.0 - v));
     if edge < 0.08 {

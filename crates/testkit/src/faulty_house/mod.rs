@@ -1,13 +1,14 @@
 //! The built-in house with a third room, a library, and with every kind of fault found in 3D-FRONT and 3D-FUTURE.
 //! The reader of 3D-FRONT is tested on it without a download.
 //!
-//! The input is a folder. Written into it is `house/`, as by `mateval_sample` except for the faults: the layout's JSON is
-//! changed before it is written, models and textures are damaged afterwards. The bytes are the same on every machine.
+//! The input is a folder. Written into it is `house/`, as by `mateval_sample` except for the faults: the layout's JSON
+//! is changed before it is written, models and textures are damaged afterwards. The bytes are the same on every
+//! machine.
 //!
 //! This file builds the third room; `faults` lists the faults and plants them. The third room lies south of the living
-//! room behind the door, and its window is an open hole. It has one fault before any is planted: no ceiling. The first two rooms stay
-//! sound except for the normals of two walls and, in `/material/7`, the outer walls' "local"; all other faults are in the
-//! third room.
+//! room behind the door, and its window is an open hole. It has one fault before any is planted: no ceiling. The first
+//! two rooms stay sound except for the normals of two walls and, in `/material/7`, the outer walls' "local"; all other
+//! faults are in the third room.
 
 pub mod faults;
 
@@ -124,8 +125,8 @@ fn add_library(house: &mut House) {
     });
 }
 
-/// Turns the last three crates in the list of furniture into pieces that are not public, as half of the data's are: they
-/// are not valid, and their models are not in the library.
+/// Turns the last three crates in the list of furniture into pieces that are not public, as half of the data's are:
+/// they are not valid, and their models are not in the library.
 fn withhold_models(json: &mut Value) {
     for place in 27..=29 {
         let record = json["furniture"][place].as_object_mut().unwrap();
@@ -450,8 +451,8 @@ mod tests {
         assert!(elsewhere.map(|(_, name)| *name).all(|name| name == "mesh_normals_not_unit"));
     }
 
-    /// Each mesh is the child of one room. Pieces refer to records, records to models and materials to textures, and the only
-    /// exceptions are those of the table.
+    /// Each mesh is the child of one room. Pieces refer to records, records to models and materials to textures, and
+    /// the only exceptions are those of the table.
     #[test]
     fn only_the_listed_references_are_broken() {
         let (house, files) = (Layout::new(), Files::new());

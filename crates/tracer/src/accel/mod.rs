@@ -408,7 +408,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
-        /// Rays traversed together find the same hits as each alone, for any number of rays, with unusable rays among them.
+        /// Rays traversed together find the same hits as each alone, for any number of rays, with unusable rays among
+        /// them.
         #[test]
         fn many_rays_find_what_each_finds_alone(
             mesh in mesh(),

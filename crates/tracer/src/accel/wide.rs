@@ -1,11 +1,11 @@
-//! The wide hierarchy that rays traverse, and how it is built: nodes of eight boxes, and blocks of up to eight triangles
-//! as leaves. Only this file names obvhs.
+//! The wide hierarchy that rays traverse, and how it is built: nodes of eight boxes, and blocks of up to eight
+//! triangles as leaves. Only this file names obvhs.
 //!
 //! First a binary tree of boxes: PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume
 //! Hierarchy Construction", 2018), then parallel reinsertion (the same authors, 2017). Each leaf holds one triangle.
 //!
-//! Then dynamic programming over the surface area cost decides which nodes of the binary tree become children of one wide
-//! node and which subtrees become one block (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs
+//! Then dynamic programming over the surface area cost decides which nodes of the binary tree become children of one
+//! wide node and which subtrees become one block (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs
 //! Through Compressed Wide BVHs", HPG 2017, section 4.1). About 90 bytes a triangle.
 
 use glam::{Vec3, Vec3A};
@@ -64,8 +64,8 @@ struct Collapse<'t> {
 }
 
 impl Wide {
-    /// Builds the hierarchy over at least one triangle with finite corners. `starts` holds the number of triangles before
-    /// each surface.
+    /// Builds the hierarchy over at least one triangle with finite corners. `starts` holds the number of triangles
+    /// before each surface.
     pub(super) fn build(triangles: &[[Vec3; 3]], starts: &[u32]) -> Self {
         let tree = &BinaryTree::build(triangles);
         let collapse = Collapse { tree, costs: costs(tree) };

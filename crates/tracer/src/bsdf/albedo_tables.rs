@@ -1,4 +1,5 @@
-//! Directional albedos, integrated at start-up: of the facets of Blender's `principled`, and of the coat of rough plastic.
+//! Directional albedos, integrated at start-up: of the facets of Blender's `principled`, and of the coat of rough
+//! plastic.
 //!
 //! Cycles compensates its single bounce off GGX facets (height-correlated masking) by tables of the light that remains
 //! after that bounce, and weakens the base under the dielectric facets by a table of what those reflect. Lookups
@@ -6,8 +7,8 @@
 //! the integral. So our grids have Blender's resolution (4.5: 32 x 32 over roughness and cosine, 16 x 16 x 16 with the
 //! index of refraction); the values are our own. They take 5 KiB for any number of materials with the same index.
 //!
-//! The coat is a rough dielectric boundary: one bounce at the facets with Smith masking on both sides. Light that hits a
-//! second facet is neither reflected nor transmitted here, so both together are below one for rough boundaries.
+//! The coat is a rough dielectric boundary: one bounce at the facets with Smith masking on both sides. Light that hits
+//! a second facet is neither reflected nor transmitted here, so both together are below one for rough boundaries.
 
 use std::array::from_fn;
 use std::sync::{Arc, OnceLock};

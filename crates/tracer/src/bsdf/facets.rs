@@ -49,8 +49,8 @@ pub(crate) fn fresnel_dielectric(cos: f32, eta: f32) -> (f32, f32) {
     (if reflected.is_nan() { 0.0 } else { reflected }, beyond)
 }
 
-/// The reflectance that [`fresnel_dielectric`] returns, for light on the side of the lower index (`eta` of at least 1) and
-/// `cos` above 0, with a single division. Cook and Torrance, "A Reflectance Model for Computer Graphics" (1982).
+/// The reflectance that [`fresnel_dielectric`] returns, for light on the side of the lower index (`eta` of at least 1)
+/// and `cos` above 0, with a single division. Cook and Torrance, "A Reflectance Model for Computer Graphics" (1982).
 pub(crate) fn fresnel_from_thinner(cos: f32, eta: f32) -> f32 {
     let g = (eta * eta - 1.0 + cos * cos).sqrt();
     let (above, below) = (cos * (g + cos) - 1.0, cos * (g - cos) + 1.0);

@@ -229,8 +229,8 @@ impl PrincipledView {
         }
     }
 
-    /// `response` without highlights: the dielectric facets are left out, and metal reflects what its facets keep at normal
-    /// incidence as a Lambertian surface.
+    /// `response` without highlights: the dielectric facets are left out, and metal reflects what its facets keep at
+    /// normal incidence as a Lambertian surface.
     pub(crate) fn without_highlights(&self, response: Response) -> Response {
         let kept = self.albedo.as_ref().map_or(1.0, |albedo| albedo.directional);
         Response { bounce: kept * FRAC_1_PI * response.cos, schlick: 0.0, dielectric: 0.0, ..response }
@@ -294,8 +294,9 @@ fn slope(cos: f32, alpha2: f32) -> f32 {
 pub(crate) enum BsdfPart {
     /// All of it.
     All,
-    /// The part that reflects stage lights ([`crate::StageLight`]), without highlights. Of principled materials this is the
-    /// base and, in place of metal facets, a diffuse part with the light that they keep; of others, all but delta lobes.
+    /// The part that reflects stage lights ([`crate::StageLight`]), without highlights. Of principled materials this is
+    /// the base and, in place of metal facets, a diffuse part with the light that they keep; of others, all but delta
+    /// lobes.
     Stage,
 }
 
@@ -303,8 +304,8 @@ pub(crate) enum BsdfPart {
 /// pairs of roughness and metallic.
 ///
 /// All variants share the directions that are sampled. With two pairs, directions come from both densities in equal
-/// parts (the balance heuristic for one sample, Veach 1997, section 9.2.4): a variant's weight is then at most twice what
-/// its own density would give it, so that paths serve both pairs.
+/// parts (the balance heuristic for one sample, Veach 1997, section 9.2.4): a variant's weight is then at most twice
+/// what its own density would give it, so that paths serve both pairs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PrincipledVariants<const K: usize> {
     view: PrincipledView,

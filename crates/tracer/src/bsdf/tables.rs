@@ -18,7 +18,8 @@ use crate::error::{MaterialFault, SceneFault};
 #[derive(Debug)]
 pub(crate) struct MaterialTables(Vec<Table>);
 
-/// Measures materials, to compare the energy of two models. Tables that depend on the same parameters are computed once.
+/// Measures materials, to compare the energy of two models. Tables that depend on the same parameters are computed
+/// once.
 #[derive(Default)]
 pub struct ReflectanceMeter {
     known: Known,
@@ -178,8 +179,8 @@ mod tests {
         MaterialModel::Conductor { ior, specular_reflectance, microfacets }
     }
 
-    /// Matt surfaces reflect their reflectance. A smooth black plastic of index 1.5 reflects 0.0918 (Egan and Hilgeman 1973,
-    /// table), and a conductor without absorption the same.
+    /// Matt surfaces reflect their reflectance. A smooth black plastic of index 1.5 reflects 0.0918 (Egan and Hilgeman
+    /// 1973, table), and a conductor without absorption the same.
     #[test]
     fn known_shares() {
         let mut meter = ReflectanceMeter::default();
@@ -203,8 +204,8 @@ mod tests {
         }
     }
 
-    /// Rough mirrors lose the light that hits a second facet: 1 - 0.971 at alpha 0.1 (GGX), 1 - 0.689 at 0.5, which Heitz et
-    /// al., "Multiple-Scattering Microfacet BSDFs" (2016), show as the darkening of rough conductors.
+    /// Rough mirrors lose the light that hits a second facet: 1 - 0.971 at alpha 0.1 (GGX), 1 - 0.689 at 0.5, which
+    /// Heitz et al., "Multiple-Scattering Microfacet BSDFs" (2016), show as the darkening of rough conductors.
     #[test]
     fn rough_mirrors_lose_light() {
         let mut meter = ReflectanceMeter::default();

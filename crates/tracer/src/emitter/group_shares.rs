@@ -6,16 +6,16 @@ use crate::emitter::Emitters;
 
 /// The smallest share of a group, so that lamps that light little of a view are sampled too.
 pub const LEAST_SHARE: f64 = 0.02;
-/// Steps of the iteration that finds the factors on solid angles. Shares that no factors can meet are approached as far as
-/// [`LEAST_FACTOR`] allows.
+/// Steps of the iteration that finds the factors on solid angles. Shares that no factors can meet are approached as far
+/// as [`LEAST_FACTOR`] allows.
 const STEPS: usize = 24;
 /// The smallest factor; the largest is 1.
 const LEAST_FACTOR: f64 = 1e-3;
 
 impl Emitters {
-    /// The same emitters. A sample that goes to an area emitter goes to one of light group g with a probability that is, on
-    /// average over `points`, proportional to `shares[g]` (at least [`LEAST_SHARE`] of all), apart from the share that is
-    /// spread evenly. The solid angles of a group's emitters are all multiplied by one factor.
+    /// The same emitters. A sample that goes to an area emitter goes to one of light group g with a probability that
+    /// is, on average over `points`, proportional to `shares[g]` (at least [`LEAST_SHARE`] of all), apart from the
+    /// share that is spread evenly. The solid angles of a group's emitters are all multiplied by one factor.
     pub(crate) fn with_group_shares(&self, points: &[Vec3], shares: &[f64]) -> Self {
         let groups = self.solid_angles_of_groups(points);
         let factors = factors(&groups, shares);
@@ -36,7 +36,8 @@ impl Emitters {
     }
 }
 
-/// The factor of each group; the largest is 1. Groups that no point sees keep the factor 1, and their shares do not count.
+/// The factor of each group; the largest is 1. Groups that no point sees keep the factor 1, and their shares do not
+/// count.
 fn factors(points: &[Vec<f64>], shares: &[f64]) -> Vec<f64> {
     let mut factors = vec![1.0; shares.len()];
     let seen: Vec<bool> = mean_probabilities(points, &factors).into_iter().map(|found| found > 0.0).collect();

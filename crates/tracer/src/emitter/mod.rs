@@ -1,10 +1,10 @@
 //! Emitters, and sampling of light that reaches a point.
 //!
-//! Sampling chooses an emitter, then a point on it or a direction towards it. The choice depends on geometry alone, never
-//! on radiance: among area emitters on estimated solid angles, with a share of 0.2 spread evenly, and between these and
-//! emitters at infinity on the share of rays that leave the scene. So pictures of each light group alone, and of any
-//! weighting of the groups, can come from the same paths. A caller that knows which groups matter in its pictures can
-//! change how often each is chosen (`group_shares`).
+//! Sampling chooses an emitter, then a point on it or a direction towards it. The choice depends on geometry alone,
+//! never on radiance: among area emitters on estimated solid angles, with a share of 0.2 spread evenly, and between
+//! these and emitters at infinity on the share of rays that leave the scene. So pictures of each light group alone, and
+//! of any weighting of the groups, can come from the same paths. A caller that knows which groups matter in its
+//! pictures can change how often each is chosen (`group_shares`).
 
 mod area;
 mod environment;
@@ -137,11 +137,12 @@ impl Emitters {
         !self.areas.is_empty() && !self.distant.is_empty()
     }
 
-    /// Divides samples between area emitters and emitters at infinity, if the share `escaping` of rays leaves the scene.
+    /// Divides samples between area emitters and emitters at infinity, if the share `escaping` of rays leaves the
+    /// scene.
     ///
-    /// All lamps together count as 1. Where rays leave the scene, a map's light may be far brighter than theirs, so it counts
-    /// nearly as much; where almost none do, almost nothing. Radiances must not count. Constant radiance counts least
-    /// everywhere: samples of the BSDF find it as well as samples of the sphere do.
+    /// All lamps together count as 1. Where rays leave the scene, a map's light may be far brighter than theirs, so it
+    /// counts nearly as much; where almost none do, almost nothing. Radiances must not count. Constant radiance counts
+    /// least everywhere: samples of the BSDF find it as well as samples of the sphere do.
     pub(crate) fn share_between(&mut self, escaping: f32) {
         let weight = |kind: &DistantKind| match kind {
             DistantKind::Map(_) => (escaping / (escaping + FEW_ESCAPE)).max(LEAST_SKY),
@@ -461,9 +462,9 @@ const WALKS: u32 = 1024;
 const RAYS: u32 = 5;
 const SEED: u64 = 0xe5_ca9e;
 
-/// The share of rays that leave the scene, among those from surfaces on which the area emitters shine, or on which light
-/// from there arrives; 1 if there are no area emitters. `first_opaque` finds the first surface in a direction that light
-/// does not pass.
+/// The share of rays that leave the scene, among those from surfaces on which the area emitters shine, or on which
+/// light from there arrives; 1 if there are no area emitters. `first_opaque` finds the first surface in a direction
+/// that light does not pass.
 ///
 /// Probe walks start on the area emitters, reflect diffusely where they hit and go straight through glass. They follow
 /// from geometry and opacity alone, and always use the same random numbers.

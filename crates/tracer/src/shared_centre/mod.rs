@@ -90,9 +90,10 @@ pub fn render_views(
     Ok(renders.pop().expect("there is one variant"))
 }
 
-/// The cameras in groups whose views can come from one set of paths, as indices: the cameras of a group stand at one point,
-/// up to the rounding of ray origins, and no picture extends more than 75 degrees from where the group's first camera looks.
-/// A camera belongs to the first group that will have it, so that cameras from elsewhere never change a group.
+/// The cameras in groups whose views can come from one set of paths, as indices: the cameras of a group stand at one
+/// point, up to the rounding of ray origins, and no picture extends more than 75 degrees from where the group's first
+/// camera looks. A camera belongs to the first group that will have it, so that cameras from elsewhere never change a
+/// group.
 pub fn groups_with_one_centre(cameras: &[Camera]) -> Vec<Vec<usize>> {
     planes(cameras, 1).into_iter().map(|group| group.views).collect()
 }
@@ -560,8 +561,8 @@ fn add(sum: &mut [f64; 3], value: [f64; 3], weight: f64) {
 
 /// The block of each pixel of each view. Pixels of one block, in any view, may share paths.
 ///
-/// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then squares
-/// of `side` pixels of the image plane of the first of them. Other cameras have blocks of their own.
+/// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then
+/// squares of `side` pixels of the image plane of the first of them. Other cameras have blocks of their own.
 pub fn noise_blocks(cameras: &[Camera], side: u32) -> Vec<Picture<u64>> {
     let groups = groups_with_one_centre(cameras);
     let of_view = |(view, camera): (usize, &Camera)| {

@@ -60,8 +60,8 @@ impl Plane {
         Self { camera: *camera, views: vec![view], samples, columns, rows }
     }
 
-    /// The same plane for one more view. `None` if its camera has another centre, or looks too far away from where the first
-    /// looks.
+    /// The same plane for one more view. `None` if its camera has another centre, or looks too far away from where the
+    /// first looks.
     pub(super) fn with(&self, camera: &Camera) -> Option<Self> {
         let mut plane = self.clone();
         plane.include(camera)?;

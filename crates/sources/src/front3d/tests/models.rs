@@ -1,5 +1,5 @@
-//! Models: faulty OBJ files, ids that are paths, the parts of a sound model, and roughness and metallic by what the data
-//! states of models, their groups, and architecture.
+//! Models: faulty OBJ files, ids that are paths, the parts of a sound model, and roughness and metallic by what the
+//! data states of models, their groups, and architecture.
 
 use mateval_scene::material::MaterialClass;
 use mateval_scene::material::{Material, MaterialModel, ScalarInput};

@@ -65,8 +65,8 @@ fn models_have_their_size_in_metres() {
     assert!(signed_volume(&shelf.mesh) > 0.0);
 }
 
-/// The painted shadow below the basket is left out. A mat in the floor's plane comes to lie on the floor, and the plate below
-/// a sculpture, though as dark and as flat as a shadow, stays too.
+/// The painted shadow below the basket is left out. A mat in the floor's plane comes to lie on the floor, and the plate
+/// below a sculpture, though as dark and as flat as a shadow, stays too.
 #[test]
 fn flat_bases_are_kept_unless_they_are_painted_shadows() {
     let of = |house: &'static FurnishedHouse, number| &pieces_of(house, LIBRARY, number)[0].mesh;

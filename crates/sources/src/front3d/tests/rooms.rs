@@ -1,5 +1,5 @@
-//! Rooms: checks, with independent code, that cameras found by the sampler satisfy the rules; and one room as a scene: the
-//! parts of other rooms that are kept, names, lights, and a render.
+//! Rooms: checks, with independent code, that cameras found by the sampler satisfy the rules; and one room as a scene:
+//! the parts of other rooms that are kept, names, lights, and a render.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};

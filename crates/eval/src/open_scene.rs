@@ -1,0 +1,96 @@
+//! Scenes of a dataset, opened and checked for scoring.
+
+use std::sync::Arc;
+
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::{SceneFolder, is_rendered};
+use mateval_scene::open::Dataset;
+use mateval_scene::{RendererId, SceneError, TriangleMesh, glb, reference};
+use mateval_tracer::World;
+
+use crate::error::EvalError;
+
+/// The views of the scene that `targets.json` names, in the scene's order; at least one.
+pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
+    let targets = &dataset.targets.targets;
+    let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
+    let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
+    if views.is_empty() {
+        let [expected, found] = ["a view of it in targets.json", "none"].map(str::to_owned);
+        return Err(EvalError::Unsound { place: format!("scene '{}'", scene.id), expected, found });
+    }
+    Ok(views)
+}
+
+/// A set of views that are rendered together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ViewSet {
+    /// The input view, and those that are it turned: they share their paths.
+    Turned,
+    /// Views from other places.
+    Wide,
+}
+
+impl ViewSet {
+    /// The views of the set; empty where there are none.
+    pub(crate) fn of<'a>(self, views: &[&'a View]) -> Vec<&'a View> {
+        views.iter().filter(|view| view.id.is_wide() == (self == Self::Wide)).copied().collect()
+    }
+
+    /// The name of a pass over the set, part of its seeds.
+    pub(crate) fn pass(self, name: &str) -> String {
+        match self {
+            Self::Turned => name.to_owned(),
+            Self::Wide => format!("{name}_wide"),
+        }
+    }
+}
+
+/// A scene, opened for scoring.
+pub struct OpenScene {
+    pub folder: SceneFolder,
+    /// Its true geometry, materials and lights, ready for ray tracing.
+    pub world: World,
+    /// The meshes of `instances.glb`, one for each surface of the world.
+    pub atlases: Vec<TriangleMesh>,
+}
+
+impl OpenScene {
+    /// Fails if a file differs from the dataset's manifest or does not fit the others: numbers carry the dataset's
+    /// fingerprint, so they must come from the files that it covers. Renders are not checked; `check_photos` does that
+    /// for those of the photo's renderer, and references are checked when they are opened.
+    pub fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Self, EvalError> {
+        // The input picture is a copy of a photo renderer's, which may have been renewed since.
+        let is_needed = |file: &str| !is_rendered(file) && !file.starts_with("views/input/rgb.");
+        dataset.check_files(&scene.id, is_needed)?;
+        let folder = dataset.folder(&scene.id);
+        let world = World::new(Arc::new(reference::read(&folder)?))?;
+        let atlases = read_atlases(&folder, scene, &world)?;
+        Ok(Self { folder, world, atlases })
+    }
+}
+
+/// Fails if a picture with which fitted light is compared differs from the dataset's manifest.
+pub(crate) fn check_photos(dataset: &Dataset, scene: &SceneFile, renderer: &RendererId) -> Result<(), EvalError> {
+    let folder = format!("ground_truth/renders/{renderer}/");
+    Ok(dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?)
+}
+
+/// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's
+/// surfaces, or the dataset is unsound.
+fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
+    let nodes = glb::read(&folder.instances())?;
+    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
+    let named = nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids);
+    let meshes: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
+    let surfaces = &world.scene().surfaces;
+    let fits = named
+        && meshes.len() == surfaces.len()
+        && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
+    if fits {
+        return Ok(meshes);
+    }
+    let path = folder.instances();
+    let what = "it does not fit scene.json and ground_truth/reference/geometry.glb; run `mateval prep verify`";
+    Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
+}
