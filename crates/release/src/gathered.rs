@@ -37,8 +37,8 @@ pub struct ViewNoise {
     pub mean_of_halves_mse: f64,
     /// As in `render.json`: linear, before exposure; may be below 0.
     pub denoised_mse: f64,
-    /// PSNR of the mean of the halves against the picture without noise, in dB: linear, with the scene's exposure, peak
-    /// 1. Null where there is no noise.
+    /// PSNR of the mean of the halves against the picture without noise, in dB: linear, with the scene's exposure, for a
+    /// peak of 1. Null where there is no noise.
     pub mean_of_halves_psnr_db: Option<f64>,
 }
 

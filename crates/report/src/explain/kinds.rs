@@ -270,9 +270,9 @@ fn multiply(model: &mut Model, scales: [f64; 3]) {
     }
 }
 
-/// Step 3: the factor 1 + q for each pixel, where q is the quadratic polynomial of its position that brings model · (1
-/// + q) nearest to the truth: the residual is projected on the products of the model and each term. All channels share
-/// the polynomial.
+/// Step 3: the factor 1 + q for each pixel, where q is the quadratic polynomial of its position that brings the model
+/// times 1 + q nearest to the truth: the residual is projected on the products of the model and each term. All channels
+/// share the polynomial.
 fn factors(patch: &Patch, model: &[[f64; 3]]) -> Vec<f64> {
     if model.len() < FEWEST_PIXELS {
         return vec![1.0; model.len()];
