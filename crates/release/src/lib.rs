@@ -6,7 +6,7 @@
 //!
 //! [`CheckedRelease::new`] reads and checks everything that is given ([`given`]) before [`CheckedRelease::write`]
 //! verifies the dataset and gathers the rest ([`gathered`]): counts beside the paper's, the noise of the photo's
-//! renderer, licences and hashes of the inputs, commands, and pictures. [`file`] holds what is written, with the
+//! renderer, licences and hashes of the inputs, commands, and pictures. [`mod@file`] holds what is written, with the
 //! citation; if the ground truth is withheld, it removes what was measured on it. `page` and `page_scene` fill the
 //! template.
 //!

@@ -122,11 +122,11 @@ impl LightMse {
     }
 }
 
-/// The standard error of the mean PSNR of several views, in dB; none without views.
+/// The standard error of the mean PSNR of several views, in dB; absent without views. Callers state it only where no
+/// view's error may be noise alone.
 ///
-/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE; an exact view adds nothing, and a view whose error may be noise
-/// alone makes the whole mean one that nothing is stated of ([`ScoreSheet::state_noise`](crate::scene::ScoreSheet)). A
-/// block's effects on all views are summed before they are squared, so that correlation between views counts.
+/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE; an exact view adds nothing. A block's effects on all views are
+/// summed before they are squared, so that correlation between views counts.
 pub fn mean_psnr_error(views: &[LightMse]) -> Option<f64> {
     let (mut by_block, mut common): (BTreeMap<u64, BlockNoise>, f64) = Default::default();
     for view in views.iter().filter(|view| view.bounded() > 0.0) {

@@ -20,10 +20,10 @@ const MOST_STRETCH: f64 = 8.0;
 /// The wanted size of an atlas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SizeWish {
-    /// Texels a side. If the charts do not fit, the least power of two within [`CHOSEN_SIZES`] that they fit
+    /// Texels a side. If the charts do not fit, the least power of two within `CHOSEN_SIZES` that they fit
     /// into.
     Fixed(u32),
-    /// The least power of two within [`CHOSEN_SIZES`] at which a texel's side on the surface is at most this
+    /// The least power of two within `CHOSEN_SIZES` at which a texel's side on the surface is at most this
     /// long, in metres; the largest one if none is fine enough.
     Texel(f64),
 }
