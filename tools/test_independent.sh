@@ -9,6 +9,7 @@ target="${CARGO_TARGET_DIR:-$PWD/target}" venv="${CARGO_TARGET_DIR:-$PWD/target}
 tools/venv.sh python3.11 "$venv" tests/independent/requirements.txt
 demo="$target/test-demo" work="$target/independent_work"
 rm -rf "$work"
+mkdir -p "$work"
 for method in nn grey; do
     "$target/debug/mateval" eval score "$demo/submissions/$method" --dataset "$demo/dataset" --scene room \
         --out "$work/$method.json" --pictures "$work/$method"
