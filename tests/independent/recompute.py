@@ -81,15 +81,12 @@ class Similarity:
 
     def load(self, state):
         own = self.lpips.state_dict()
-        # Both name layers in the same order, whatever the prefix.
-        wanted = [name for name in own if "scaling_layer" not in name and not name.startswith("lins.")]
-        if len(wanted) > len(state):
-            raise TypeError("the weights hold fewer tensors than the network")
-        by_shape = collections.defaultdict(list)
-        for name in sorted(state):
-            by_shape[tuple(state[name].shape)].append(state[name])
-        for name in wanted:
-            own[name] = by_shape[tuple(own[name].shape)].pop(0)
+        for k, layer in enumerate(("slice1.0", "slice2.3", "slice3.6", "slice4.8", "slice5.10"), 1):
+            for part in ("weight", "bias"):
+                own[f"net.{layer}.{part}"] = state[f"conv{k}.{part}"]
+            # Both names are of one layer.
+            for name in (f"lin{k - 1}.model.1.weight", f"lins.{k - 1}.model.1.weight"):
+                own[name] = state[f"lin{k}.weight"].reshape(own[name].shape)
         self.lpips.load_state_dict(own)
 
     def values(self, prediction, reference, mask, with_flip):
