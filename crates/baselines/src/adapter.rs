@@ -251,7 +251,7 @@ impl AdaptedFile {
         Ok(())
     }
 
-    /// The linear picture; `channel` selects a scalar, which is repeated in all three channels. None where an optional
+    /// The linear picture; `channel` selects a scalar, which is repeated in all three channels. Absent if an optional
     /// file is missing.
     pub(crate) fn read(
         &self,

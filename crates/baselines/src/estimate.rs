@@ -139,7 +139,7 @@ impl Placement {
     }
 
     /// The part of a view of the size `view` that a picture of the size `picture` shows, both as width and height in
-    /// pixels. None where the placement does not allow the picture's proportions.
+    /// pixels. Absent if the placement does not allow the picture's proportions.
     pub fn region(self, picture: (usize, usize), view: (usize, usize)) -> Option<Region> {
         let stretch = (picture.0 * view.1) as f64 / (picture.1 * view.0) as f64;
         let whole = Region::whole(view);

@@ -382,7 +382,7 @@ pub const BOUNDS: Bounds = Bounds {
 pub const BASE_COLOR_PSNR_DB: f64 = 40.0;
 
 /// Smallest share of equal ids away from edges. Both renderers look through pixel centres; the rest allows for surfaces
-/// in the same plane, either of which may be hit first.
+/// in the same plane: either may be hit first.
 pub const EQUAL_ID_SHARE: f64 = 0.99;
 
 /// Largest median difference of depths, in metres. Blender stores positions as 32-bit floats, which are exact to

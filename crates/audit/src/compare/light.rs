@@ -16,7 +16,7 @@ use super::file::{
 
 /// The tiles of a view with the kinds of material that they show, and the pixels that count.
 pub(super) struct ShownKinds {
-    /// Each tile with the last kind, in the order of [`MaterialKind`], that it shows; none where it shows only
+    /// Each tile with the last kind, in the order of [`MaterialKind`], that it shows; absent if it shows only
     /// background.
     tiles: Vec<(Tile, Option<MaterialKind>)>,
     /// Pixels whose mean is compared, and to which differences are relative: the valid pixels of the tiles that decide,
@@ -385,8 +385,8 @@ impl Difference {
         self.excess(bound, scale).iter().any(|excess| *excess > 1.0)
     }
 
-    /// Three standard errors divided by the bound, in the channel where this is largest; none where `scale` is 0 in
-    /// all.
+    /// Three standard errors divided by the bound, in the channel with the largest quotient; absent if `scale` is 0
+    /// in every channel.
     pub(super) fn noise(&self, bound: f64, scale: [f64; 3]) -> Option<f64> {
         let of = |c: usize| (scale[c] > 0.0).then(|| STANDARD_ERRORS * self.error[c] / (bound * scale[c]));
         (0..3).filter_map(of).max_by(f64::total_cmp)

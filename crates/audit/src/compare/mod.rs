@@ -21,8 +21,7 @@ use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Psnr;
 use mateval_prep::render::RendererKind;
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::BuildFolder;
-use mateval_scene::layout::{COMPARE, SceneFolder};
+use mateval_scene::layout::{BuildFolder, COMPARE, SceneFolder};
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::render_file;
@@ -373,7 +372,7 @@ struct Converted<'a> {
 }
 
 impl Converted<'_> {
-    /// Renders the view with the source's own materials and compares; none where the materials were not converted.
+    /// Renders the view with the source's own materials and compares; absent if the materials were not converted.
     fn compare(&self, samples: u32, progress: Progress<'_>) -> Result<Option<SourceComparison>, AuditError> {
         let reference = self.world.scene();
         let Some(source) = reference::read_source_materials(self.folder, reference.materials.len())? else {
@@ -391,7 +390,7 @@ impl Converted<'_> {
     }
 
     /// The mean over valid pixels of the product of the halves' errors, which are independent of each other, as a
-    /// preview shows them; none where no pixel is valid.
+    /// preview shows them; absent if no pixel is valid.
     fn error_without_noise(&self, theirs: &Halves, valid: &Mask) -> Option<f64> {
         let errors = [(&self.rgb.a, &theirs.a), (&self.rgb.b, &theirs.b)]
             .map(|(ours, theirs)| (self.exposed(ours).to_srgb(), self.exposed(theirs).to_srgb()));

@@ -144,7 +144,7 @@ pub(super) fn wanted_samples(pilot: &OurLight, theirs: &TheirView, shown: &Shown
     (f64::from(PILOT) * most).ceil() as u32
 }
 
-/// By how much our variance exceeds what is allowed, in the median tile; none where no tile decides. Allowed is
+/// By how much our variance exceeds what is allowed, in the median tile; absent if no tile decides. Allowed is
 /// Blender's own variance, or that at which [`SHARE_OF_BOUND`] is met.
 fn ratio([ours, theirs]: [&Halves; 2], shown: &ShownKinds, bound: f64) -> Option<f64> {
     let scale = ours.means(shown.counted());

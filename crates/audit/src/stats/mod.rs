@@ -602,7 +602,7 @@ mod tests {
             names.iter().map(|name| (Role::Furniture {}, Some("Sofa"), Some(name.as_str()), true)).collect();
         let (texts, bars) =
             read_picture(&picture(&counted(&dataset(vec![scene("a", SourceKind::Front3d, "h", &things)]))));
-        // 200 rows, of which 2 are headings without a bar, and one column of the histogram.
+        // 200 rows, 2 of them headings without a bar, and one column of the histogram.
         assert_eq!(bars.len(), 198 + 1);
         assert!(texts.iter().any(|text| text == "and 808 more rows"), "{texts:?}");
         assert!(texts.iter().all(|text| text.chars().count() <= 50));

@@ -548,7 +548,7 @@ mod tests {
         assert!(known >= fitted - 0.3, "{known} {fitted}");
     }
 
-    /// A photo that shows no light, one that is far too bright, and one of which only the brightest values are known.
+    /// A photo that shows no light, one that is far too bright, and one with nothing but its brightest values known.
     #[test]
     fn bad_photos_give_finite_colours() {
         let mut room = planted(2).room;

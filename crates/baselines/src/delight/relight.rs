@@ -1,4 +1,4 @@
-//! A room lit anew: the de-lit photo under its fitted lights, each of which may be dimmed.
+//! A room lit anew: the de-lit photo under its fitted lights, which may be dimmed one by one.
 //!
 //! In: the public geometry of a scene, its photo, and the pictures and lights that [`super::write`] has written. Out:
 //! the room under all lights, and under each of the strongest alone. Light that reaches a place by way of other
@@ -298,7 +298,7 @@ impl LitRoom<'_> {
     fn picture(&self, radiances: &[[f64; 3]], factors: &[f64]) -> Result<Picture<LinearRgb>, BaselineError> {
         let room = self.room;
         let weights = radiances.iter().zip(factors).map(|(radiance, factor)| radiance.map(|v| v * factor));
-        // The last picture is that of the photo as a light, of which there is none.
+        // The last picture would be that of the photo as a light, which this room lacks.
         let weights: Vec<[f64; 3]> = weights.chain([[0.0; 3]]).collect();
         let halves = weighted(&self.halves, &weights)?;
         let (diffuse, gloss) = (filtered(room, &halves.diffuse), filtered(room, &halves.gloss));
