@@ -7,9 +7,9 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, UvTransform};
+use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, UvTransform};
-use mateval_scene::reference::{Emission, ReferenceScene};
 use mateval_tracer::{RenderSettings, World};
 
 use super::blender_job::{self, BOUNCES, SEEDS, SIZE, Shot};

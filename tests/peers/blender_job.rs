@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::{Camera, SceneId, ViewId};
 use mateval_image::{LinearRgb, Picture};
 use mateval_prep::blender::{BlenderEvent, BlenderLimits, BlenderProgram, JobFolder, JobPlan, JobView, tail};
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{Camera, SceneId, ViewId};
 
 use super::tiles::Tiles;
 

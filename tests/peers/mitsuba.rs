@@ -8,9 +8,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use mateval_audit::mitsuba_export::export;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::{Camera, Severity};
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{Camera, Severity};
 use mateval_tracer::{RenderSettings, World, render};
 
 use super::python;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use mateval_scene::Camera;
-use mateval_scene::reference::ReferenceScene;
+use mateval_dataset::Camera;
+use mateval_dataset::reference::ReferenceScene;
 use mateval_sources::bitterli::{self, Limits};
 use mateval_testkit::shared_data;
 

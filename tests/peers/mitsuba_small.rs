@@ -1,13 +1,13 @@
 //! Small scenes, one for each kind of material and light.
 
 use glam::Vec3;
-use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::material::{
+use mateval_dataset::material::{
     BumpMap, ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour,
     ScalarInput, TextureIndex, UvTransform,
 };
-use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture};
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture};
+use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
+use mateval_image::{Texels, Texture, Wrap};
 
 use super::mitsuba::{Case, all_agree};
 use mateval_testkit::scenes::{Builder, grey, material, quad, sphere};

@@ -7,26 +7,26 @@ use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 /// The crates of ours that each crate may use; names without `mateval-`.
 pub const ARROWS: [(&str, &[&str]); 18] = [
     ("mateval-image", &[]),
-    ("mateval-scene", &["image"]),
+    ("mateval-dataset", &["image"]),
     ("mateval-metrics", &["image"]),
     ("mateval-procedural", &[]),
-    ("mateval-tracer", &["scene", "image"]),
-    ("mateval-light", &["scene", "image", "tracer"]),
-    ("mateval-sample", &["scene", "image"]),
-    ("mateval-sources", &["scene", "image", "tracer"]),
-    ("mateval-prep", &["sources", "scene", "image", "tracer"]),
-    ("mateval-audit", &["prep", "scene", "image", "metrics", "tracer"]),
-    ("mateval-export", &["scene", "image"]),
-    ("mateval-baselines", &["scene", "image", "tracer", "light", "procedural"]),
-    ("mateval-submission", &["scene", "image", "tracer"]),
-    ("mateval-eval", &["submission", "light", "metrics", "tracer", "scene", "image"]),
-    ("mateval-report", &["eval", "submission", "metrics", "scene", "image"]),
-    ("mateval-release", &["audit", "eval", "prep", "report", "scene", "image"]),
+    ("mateval-tracer", &["dataset", "image"]),
+    ("mateval-light", &["dataset", "image", "tracer"]),
+    ("mateval-sample", &["dataset", "image"]),
+    ("mateval-sources", &["dataset", "image", "tracer"]),
+    ("mateval-prep", &["sources", "dataset", "image", "tracer"]),
+    ("mateval-audit", &["prep", "dataset", "image", "metrics", "tracer"]),
+    ("mateval-export", &["dataset", "image"]),
+    ("mateval-baselines", &["dataset", "image", "tracer", "light", "procedural"]),
+    ("mateval-submission", &["dataset", "image", "tracer"]),
+    ("mateval-eval", &["submission", "light", "metrics", "tracer", "dataset", "image"]),
+    ("mateval-report", &["eval", "submission", "metrics", "dataset", "image"]),
+    ("mateval-release", &["audit", "eval", "prep", "report", "dataset", "image"]),
     (
         "mateval",
         &[
             "image",
-            "scene",
+            "dataset",
             "metrics",
             "tracer",
             "light",
@@ -109,8 +109,11 @@ fn the_arrows_are_those_of_the_design() {
 /// The twin: dependencies in the opposite direction.
 #[test]
 fn an_arrow_back_is_found() {
-    assert_eq!(forbidden("mateval-image", &["mateval-scene"]), ["mateval-image -> mateval-scene"]);
-    assert_eq!(forbidden("mateval-metrics", &["mateval-image", "mateval-scene"]), ["mateval-metrics -> mateval-scene"]);
+    assert_eq!(forbidden("mateval-image", &["mateval-dataset"]), ["mateval-image -> mateval-dataset"]);
+    assert_eq!(
+        forbidden("mateval-metrics", &["mateval-image", "mateval-dataset"]),
+        ["mateval-metrics -> mateval-dataset"]
+    );
     assert_eq!(forbidden("mateval-eval", &["mateval-prep"]), ["mateval-eval -> mateval-prep"]);
     assert_eq!(forbidden("mateval-utils", &[]).len(), 1);
 }

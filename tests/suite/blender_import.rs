@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::process::Command;
 
-use mateval_scene::glb::{self, GlbNode};
+use mateval_dataset::glb::{self, GlbNode};
 
 use super::blender::blender;
 use super::sample::unrendered;

@@ -7,17 +7,17 @@ use std::process::Command;
 use std::sync::{Arc, LazyLock};
 
 use mateval_audit::compare::file::{CompareFile, Quantity, State};
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::material::{ColorInput, MaterialModel};
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::render_file::RenderFile;
+use mateval_dataset::render_file::RenderNoise;
+use mateval_dataset::{RendererId, SceneId, reference};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
 use mateval_prep::render::RendererKind;
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::material::{ColorInput, MaterialModel};
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_file::RenderNoise;
-use mateval_scene::{RendererId, SceneId, reference};
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
 use super::command::{mateval, run};
@@ -45,11 +45,11 @@ fn room(dataset: &Path) -> SceneFolder {
 }
 
 fn views(dataset: &Path) -> Vec<View> {
-    mateval_scene::json::read::<SceneFile>(&room(dataset).scene_file()).unwrap().views
+    mateval_dataset::json::read::<SceneFile>(&room(dataset).scene_file()).unwrap().views
 }
 
 fn their_folder(dataset: &Path, view: &str) -> PathBuf {
-    let view = mateval_scene::ViewId::new(view).unwrap();
+    let view = mateval_dataset::ViewId::new(view).unwrap();
     room(dataset).render(&RendererId::new("blender").unwrap(), &view)
 }
 
@@ -141,7 +141,7 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
             noise: RenderNoise::of([&a.sum(), &b.sum()], &a.sum()),
             approximations: Vec::new(),
         };
-        mateval_scene::json::write(&folder.join("render.json"), &render).unwrap();
+        mateval_dataset::json::write(&folder.join("render.json"), &render).unwrap();
     }
 }
 
@@ -209,7 +209,7 @@ fn a_correct_twin_agrees() {
         "{}",
         found.stdout
     );
-    let file: CompareFile = mateval_scene::json::read(&out.join("compare.json")).unwrap();
+    let file: CompareFile = mateval_dataset::json::read(&out.join("compare.json")).unwrap();
     let scene = &file.scenes[0];
     assert_eq!((file.agrees, scene.tile_bound, scene.samples_each_half), (true, 0.01, SAMPLES));
     let lights = || scene.views.iter().flat_map(|view| &view.light);

@@ -4,13 +4,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use mateval_dataset::dataset::{SceneFile, TrueMaterials};
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::material::{ConductorIor, MaterialModel, PrincipledFlavour};
+use mateval_dataset::{SceneId, glb, reference};
 use mateval_eval::truth::true_material;
 use mateval_image::{LinearRgb, Picture};
 use mateval_prep::conversion::is_scored_model;
-use mateval_scene::dataset::{SceneFile, TrueMaterials};
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::material::{ConductorIor, MaterialModel, PrincipledFlavour};
-use mateval_scene::{SceneId, glb, reference};
 use mateval_tracer::{Coat, LightGroups, Lighting, RenderSettings, Repaint, World, render_repainted, render_views};
 use serde_json::Value;
 
@@ -25,7 +25,7 @@ fn room(dataset: &Path) -> SceneFolder {
 }
 
 fn scene_file(dataset: &Path) -> SceneFile {
-    mateval_scene::json::read(&room(dataset).scene_file()).unwrap()
+    mateval_dataset::json::read(&room(dataset).scene_file()).unwrap()
 }
 
 /// The mean over pixels of the absolute difference, over the mean of the second picture.
@@ -53,7 +53,7 @@ fn the_maps_describe_a_surface_completely() {
     assert!(materials.iter().filter(|material| material.has_appearance()).count() >= 8);
 
     let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
-    let coat = |instance: &mateval_scene::dataset::Instance| {
+    let coat = |instance: &mateval_dataset::dataset::Instance| {
         let size = instance.atlas.as_ref()?.size as usize;
         let truth = true_material(&folder, &instance.id, size).unwrap();
         Some(Coat { base_colors: vec![truth.base_color], roughness: truth.roughness, metallic: truth.metallic })
@@ -97,7 +97,7 @@ fn a_recipe_may_keep_the_sources_materials() {
     // The same materials are kept beside the converted ones.
     let count = reference::read(&room(unrendered())).unwrap().materials.len();
     let kept = reference::read_source_materials(&room(unrendered()), count).unwrap().unwrap();
-    let models = |materials: &[mateval_scene::material::Material]| {
+    let models = |materials: &[mateval_dataset::material::Material]| {
         materials
             .iter()
             .map(|material| (material.name.clone(), std::mem::discriminant(&material.model)))

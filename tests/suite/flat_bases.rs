@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::{SceneId, reference};
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::{SceneId, reference};
 use mateval_testkit::faulty_house;
 use serde_json::{Value, json};
 
@@ -43,7 +43,7 @@ fn compared(dataset: &Path, blender: &Path) -> Run {
 fn lower_the_mat(dataset: &Path) {
     let folder = SceneFolder::of(dataset, &SceneId::new("library").unwrap());
     let mut scene = reference::read(&folder).unwrap();
-    let is_mat = |surface: &&mut mateval_scene::reference::Surface| {
+    let is_mat = |surface: &&mut mateval_dataset::reference::Surface| {
         surface.mesh.triangles.len() == 2 && surface.mesh.positions.iter().all(|corner| corner.y == 1e-4)
     };
     let mats: Vec<_> = scene.surfaces.iter_mut().filter(is_mat).collect();

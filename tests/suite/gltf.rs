@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, LazyLock};
 
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::material::{Material, MaterialModel, ScalarInput};
+use mateval_dataset::reference::{Emission, ReferenceScene, Surface};
+use mateval_dataset::{Camera, SceneId, SceneLights, reference};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{Picture, Texture, Wrap, png_io};
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::material::{Material, MaterialModel, ScalarInput};
-use mateval_scene::reference::{Emission, ReferenceScene, Surface};
-use mateval_scene::{Camera, SceneId, SceneLights, reference};
 use mateval_sources::gltf::{self, GltfScene, Limits};
 use mateval_testkit::kept_folder;
 use mateval_tracer::{RenderSettings, World};
@@ -30,7 +30,7 @@ fn room() -> ReferenceScene {
 
 fn camera() -> Camera {
     let folder = SceneFolder::of(unrendered(), &SceneId::new("room").unwrap());
-    let scene: mateval_scene::dataset::SceneFile = mateval_scene::json::read(&folder.scene_file()).unwrap();
+    let scene: mateval_dataset::dataset::SceneFile = mateval_dataset::json::read(&folder.scene_file()).unwrap();
     scene.views[0].camera
 }
 
@@ -114,7 +114,7 @@ fn instances_and_textures_come_back() {
             same_material((&read.scene, found), (&room, expected));
         }
         same_camera(&read.camera.unwrap());
-        let warnings = read.findings.iter().filter(|finding| finding.severity != mateval_scene::Severity::Note);
+        let warnings = read.findings.iter().filter(|finding| finding.severity != mateval_dataset::Severity::Note);
         let warnings: Vec<String> = warnings.map(|finding| finding.message.clone()).collect();
         assert_eq!(warnings, ["cones of spot lights: not represented"]);
     }

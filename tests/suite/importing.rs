@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::{TriangleMesh, glb};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, Wrap, png_io};
-use mateval_scene::mesh::UvAtlas;
-use mateval_scene::{TriangleMesh, glb};
 use serde_json::{Value, json};
 
 use super::command::{Run, baseline, mateval, run};

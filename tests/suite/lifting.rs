@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use mateval_dataset::glb;
+use mateval_dataset::mesh::UvAtlas;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::glb;
-use mateval_scene::mesh::UvAtlas;
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, score};

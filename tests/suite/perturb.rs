@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::{SceneId, glb};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, exr_io, png_io};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::{SceneId, glb};
 use serde_json::{Value, json};
 
 use super::command::{Run, baseline, mateval, run, score, verify};
@@ -42,7 +42,7 @@ fn true_estimate(folder: &Path) -> PathBuf {
 
 fn room(dataset: &Path) -> (SceneFolder, SceneFile) {
     let folder = SceneFolder::of(dataset, &SceneId::new("room").unwrap());
-    let file = mateval_scene::json::read(&folder.scene_file()).unwrap();
+    let file = mateval_dataset::json::read(&folder.scene_file()).unwrap();
     (folder, file)
 }
 

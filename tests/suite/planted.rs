@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::{json, manifest};
 use mateval_image::Picture;
-use mateval_scene::{json, manifest};
 use serde_json::Value;
 
 /// The scene of a damaged dataset.

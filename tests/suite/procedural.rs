@@ -9,12 +9,12 @@ use mateval_baselines::estimate::Estimate;
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::geometry::SeenPixels;
 use mateval_baselines::lift::{Texel, lift, place_of};
+use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::open::Dataset;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_procedural::library::entry;
-use mateval_scene::mesh::UvAtlas;
-use mateval_scene::open::Dataset;
 use mateval_testkit::kept_folder;
 
 use super::command::{Run, baseline, run};

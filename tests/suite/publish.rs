@@ -36,7 +36,7 @@ fn the_two_trees_together_are_the_dataset() {
     let lines = manifest(&public);
     let lines: String =
         lines.lines().filter(|line| line.contains("/ground_truth/")).map(|line| format!("{line}\n")).collect();
-    assert_eq!(commitment(&published), mateval_scene::manifest::sha256_of_bytes(lines.as_bytes()));
+    assert_eq!(commitment(&published), mateval_dataset::manifest::sha256_of_bytes(lines.as_bytes()));
     copy_folder(&private, &public);
     // What `prep` keeps for itself is not published.
     let whole: Vec<_> = files_below(dataset()).into_iter().filter(|file| !file.starts_with(".build")).collect();
@@ -58,7 +58,7 @@ fn another_truth_has_another_commitment() {
     // The files do not match the manifest: nothing is published.
     publish(changed.path(), &out.path().join("b")).ends_with(2).says("changed_file");
     assert!(!out.path().join("b").exists() || files_below(&out.path().join("b")).is_empty());
-    mateval_scene::manifest::write(changed.path()).unwrap();
+    mateval_dataset::manifest::write(changed.path()).unwrap();
     let other = publish(changed.path(), &out.path().join("b")).ends_with(0);
     assert_ne!(commitment(&published), commitment(&other));
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mateval_scene::Severity;
+use mateval_dataset::Severity;
 use mateval_sources::bitterli;
 use mateval_testkit::shared_data;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use glam::{Vec3, vec3};
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 use serde_json::{Value, json};
 
 use super::command::{baseline, run};

@@ -32,7 +32,7 @@ fn page(out: &Path) -> String {
 }
 
 fn stated(out: &Path) -> ReleaseFile {
-    mateval_scene::json::read(&out.join("release.json")).unwrap()
+    mateval_dataset::json::read(&out.join("release.json")).unwrap()
 }
 
 /// A comparison of the dataset's scene with one check a view; the first has this state.

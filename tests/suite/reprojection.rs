@@ -1,11 +1,11 @@
 //! One camera matrix holds for every picture. Points of the meshes are projected by a few lines that share no code with
-//! `mateval_scene::Camera`; at the resulting pixels, the pictures of each view must hold the points' depth, ids,
+//! `mateval_dataset::Camera`; at the resulting pixels, the pictures of each view must hold the points' depth, ids,
 //! normals, masks and colours. With a camera rolled by three degrees they must not.
 
 use std::path::Path;
 
+use mateval_dataset::glb;
 use mateval_image::{Mask, Picture, exr_io, png_io};
-use mateval_scene::glb;
 use serde_json::Value;
 
 use super::planted::roll;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::dataset::SceneFile;
+use mateval_dataset::dataset::SceneFile;
 use serde_json::Value;
 
 use super::command::run_words;
@@ -116,7 +116,7 @@ fn the_worked_example_of_the_camera_is_right() {
     for numbers in ["2.7076979", "(1.129893, 0.012000, 2.234759)", "2.695910, pixel position (81.6560, 232.5347)"] {
         assert!(text.contains(numbers), "FORMAT.md no longer contains {numbers}");
     }
-    let scene: SceneFile = mateval_scene::json::read(&spec("examples/scene.json")).unwrap();
+    let scene: SceneFile = mateval_dataset::json::read(&spec("examples/scene.json")).unwrap();
     let [input, up_left] = [&scene.views[0].camera, &scene.views[1].camera];
     assert!(input.turned(5.0, 5.0).matrix().abs_diff_eq(up_left.matrix(), 1e-12));
     let world = input.unproject([60.5, 210.5].into(), 2.7076979);

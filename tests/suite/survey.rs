@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
 
-use mateval_scene::lease::Lease;
+use mateval_dataset::lease::Lease;
 use serde_json::{Value, json};
 
 use super::command::{Run, mateval, run};

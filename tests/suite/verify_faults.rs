@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use mateval_dataset::camera::Camera;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Normal, Picture, png_io};
-use mateval_scene::camera::Camera;
 use serde_json::Value;
 
 use super::command::{Run, run, verify};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use glam::{DMat4, DVec2, DVec3};
+use mateval_dataset::Camera;
+use mateval_dataset::glb;
 use mateval_image::{exr_io, png_io};
-use mateval_scene::Camera;
-use mateval_scene::glb;
 use mateval_testkit::kept_folder;
 use serde_json::Value;
 
@@ -79,7 +79,7 @@ fn a_moved_view_is_found() {
 /// Triangles of all instances, as corners.
 fn triangles(dataset: &Path) -> Vec<[DVec3; 3]> {
     let nodes = glb::read(&dataset.join("scenes/room/geometry/instances.glb")).unwrap();
-    let of_mesh = |mesh: &mateval_scene::TriangleMesh| -> Vec<[DVec3; 3]> {
+    let of_mesh = |mesh: &mateval_dataset::TriangleMesh| -> Vec<[DVec3; 3]> {
         mesh.triangles.iter().map(|corners| corners.map(|at| mesh.positions[at as usize].as_dvec3())).collect()
     };
     nodes.iter().flat_map(|node| of_mesh(&node.mesh)).collect()

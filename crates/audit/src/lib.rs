@@ -12,9 +12,9 @@ pub mod verify;
 
 use std::path::PathBuf;
 
+use mateval_dataset::ids::quoted;
+use mateval_dataset::{SceneId, ViewId};
 use mateval_prep::render::RendererKind;
-use mateval_scene::ids::quoted;
-use mateval_scene::{SceneId, ViewId};
 
 /// Why a dataset could not be examined, exported or published.
 #[derive(Debug, thiserror::Error)]
@@ -79,7 +79,7 @@ pub enum AuditError {
     Tracer(#[from] mateval_tracer::TracerError),
     /// The dataset could not be read or written.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),

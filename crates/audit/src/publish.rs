@@ -6,12 +6,12 @@
 
 use std::path::Path;
 
-use mateval_scene::dataset::{DatasetFile, FORMAT};
-use mateval_scene::layout::{COMPARE, DATASET, MANIFEST, is_ground_truth};
-use mateval_scene::manifest::{self, Entry, sha256_of_bytes};
-use mateval_scene::open::check_whole;
-use mateval_scene::work_folder::{WorkFolder, check_holds_none};
-use mateval_scene::{Progress, Report, SceneError, json};
+use mateval_dataset::dataset::{DatasetFile, FORMAT};
+use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST, is_ground_truth};
+use mateval_dataset::manifest::{self, Entry, sha256_of_bytes};
+use mateval_dataset::open::check_whole;
+use mateval_dataset::work_folder::{WorkFolder, check_holds_none};
+use mateval_dataset::{Progress, Report, SceneError, json};
 
 use crate::AuditError;
 

@@ -14,12 +14,12 @@ use std::path::PathBuf;
 use mateval_baselines::delight::{CandidateLights, DelightOptions, DelitPhoto, delight};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::geometry::SceneGeometry;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::scene_cost::processor_time;
 use mateval_image::exr_io::read_linear;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::joint_fit::JointFitRules;
-use mateval_scene::open::Dataset;
-use mateval_scene::scene_cost::processor_time;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();

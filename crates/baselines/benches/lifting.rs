@@ -17,8 +17,8 @@ use mateval_baselines::geometry::{SceneGeometry, SeenPoint};
 use mateval_baselines::lift::{PartialAtlas, Texel, lift, place_of};
 use mateval_baselines::maps::Maps;
 use mateval_baselines::nn::{self, NnOptions, seen_pixels};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
 
 const SIZE: usize = 1024;
 const ROUNDS: usize = 3;
@@ -50,7 +50,7 @@ fn main() {
 struct Step {
     points: Vec<SeenPoint>,
     known: PartialAtlas,
-    mesh: mateval_scene::TriangleMesh,
+    mesh: mateval_dataset::TriangleMesh,
 }
 
 impl Step {

@@ -11,8 +11,8 @@ use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::procedural::{ProceduralOptions, scene_maps};
-use mateval_scene::open::Dataset;
-use mateval_scene::scene_cost::processor_time;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::scene_cost::processor_time;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();

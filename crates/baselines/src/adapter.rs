@@ -5,10 +5,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::submission::Map;
+use mateval_dataset::submission::StoredEncoding;
 use mateval_image::texture_io::read_texture;
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
-use mateval_scene::submission::Map;
-use mateval_scene::submission::StoredEncoding;
 use serde::Deserialize;
 
 use crate::error::{AdapterError, BaselineError};

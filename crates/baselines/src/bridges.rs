@@ -14,14 +14,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
+use mateval_dataset::dataset::Instance;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::WorkFolder;
+use mateval_dataset::{Progress, Report, SceneError, SceneId, TriangleMesh};
 use mateval_image::exr_io::{Precision, write_linear};
 use mateval_image::store::write_whole;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, png_io};
-use mateval_scene::dataset::Instance;
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Progress, Report, SceneError, SceneId, TriangleMesh};
 use serde_json::json;
 
 use crate::error::{BaselineError, LabelsError};

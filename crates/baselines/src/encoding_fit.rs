@@ -10,7 +10,7 @@
 //! the best encoding must explain at least [`LEAST_EXPLAINED`] of the truth's variance, and the error of every other
 //! one must be at least [`CLEARLY_WORSE`] times as large.
 
-use mateval_scene::submission::StoredEncoding;
+use mateval_dataset::submission::StoredEncoding;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -276,8 +276,8 @@ fn centred(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use mateval_dataset::splitmix64::number;
     use mateval_image::transfer::srgb_from_linear;
-    use mateval_scene::splitmix64::number;
 
     use super::*;
 

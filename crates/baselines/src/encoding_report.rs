@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::DVec2;
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::Map;
+use mateval_dataset::submission::StoredEncoding;
+use mateval_dataset::{Progress, Report};
 use mateval_image::exr_io::{read_linear, read_scalar};
 use mateval_image::{LinearRgb, Mask, Picture, png_io};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::Map;
-use mateval_scene::submission::StoredEncoding;
-use mateval_scene::{Progress, Report};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -359,7 +359,7 @@ impl InputView {
             return Ok(Self { truth, valid, instances });
         }
         let what = "its pictures differ in size; run `mateval prep verify`".to_owned();
-        Err(mateval_scene::SceneError::Unsupported { path: shown, what }.into())
+        Err(mateval_dataset::SceneError::Unsupported { path: shown, what }.into())
     }
 
     /// Valid pixels whose eight neighbours are valid and show the same instance: at most `most`, evenly spaced in

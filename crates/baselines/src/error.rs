@@ -211,7 +211,7 @@ pub enum BaselineError {
     Tracer(#[from] mateval_tracer::TracerError),
     /// The dataset could not be read, or the submission could not be written.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),

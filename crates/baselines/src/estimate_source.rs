@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use mateval_dataset::Progress;
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::Map;
+use mateval_dataset::submission::StoredEncoding;
 use mateval_image::LinearRgb;
 use mateval_image::exr_io::{read_linear, read_scalar};
-use mateval_scene::Progress;
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::Map;
-use mateval_scene::submission::StoredEncoding;
 
 use crate::adapter::Adapter;
 use crate::delight::{CandidateLights, DelightOptions, delight};

@@ -7,7 +7,7 @@
 use std::num::NonZero;
 
 use glam::{DVec2, DVec3};
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -130,8 +130,8 @@ pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) ->
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use mateval_dataset::mesh::UvAtlas;
     use mateval_image::Picture;
-    use mateval_scene::mesh::UvAtlas;
 
     use super::FillRule;
     use super::*;

@@ -5,11 +5,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use mateval_dataset::dataset::{Part, SceneFile, View};
+use mateval_dataset::layout::{INPUT, SceneFolder, part_picture};
+use mateval_dataset::submission::MAP_SIZES;
+use mateval_dataset::{Camera, PartSetId, SceneError, TriangleMesh, glb, reference};
 use mateval_image::{Mask, Picture, png_io};
-use mateval_scene::dataset::{Part, SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
-use mateval_scene::submission::MAP_SIZES;
-use mateval_scene::{Camera, PartSetId, SceneError, TriangleMesh, glb, reference};
 use mateval_tracer::World;
 use mateval_tracer::aov::{COARSE_SUBPIXELS, coarse_subpixels, hit_through};
 use rayon::prelude::*;

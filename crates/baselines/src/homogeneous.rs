@@ -7,11 +7,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
+use mateval_dataset::{PartSetId, Progress};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, png_io};
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::{GREY, MAP_SIZES, Map};
-use mateval_scene::{PartSetId, Progress};
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};

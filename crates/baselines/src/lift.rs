@@ -1,10 +1,10 @@
 //! Writes an estimate of the input view into the texels of an instance's atlas that the view shows.
 
 use glam::{DVec2, DVec3};
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::camera::Projection;
+use mateval_dataset::mesh::UvAtlas;
 use mateval_image::Picture;
-use mateval_scene::TriangleMesh;
-use mateval_scene::camera::Projection;
-use mateval_scene::mesh::UvAtlas;
 use mateval_tracer::Ray;
 use rayon::prelude::*;
 
@@ -50,10 +50,10 @@ pub struct PartialAtlas {
 /// use mateval_baselines::lift::{Texel, lift};
 /// use mateval_baselines::geometry::SeenPixels;
 /// use mateval_image::{LinearRgb, Picture};
-/// use mateval_scene::layout::SceneFolder;
-/// use mateval_scene::material::{ColorInput, Material, MaterialModel};
-/// use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-/// use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+/// use mateval_dataset::layout::SceneFolder;
+/// use mateval_dataset::material::{ColorInput, Material, MaterialModel};
+/// use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
+/// use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
 /// use mateval_tracer::World;
 /// use serde_json::json;
 ///

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_dataset::SceneError;
+use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, png_io};
-use mateval_scene::SceneError;
-use mateval_scene::mesh::UvAtlas;
-use mateval_scene::submission::{GREY, MAP_SIZES, Map};
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};

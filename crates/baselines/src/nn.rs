@@ -6,10 +6,10 @@
 
 use std::path::Path;
 
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::MAP_SIZES;
-use mateval_scene::{Progress, Report};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::MAP_SIZES;
+use mateval_dataset::{Progress, Report};
 use rayon::prelude::*;
 
 use crate::error::BaselineError;

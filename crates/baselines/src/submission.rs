@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::layout::is_rendered;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::StoredEncoding;
-use mateval_scene::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
-use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
-use mateval_scene::{Progress, Report, SceneError, json};
+use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::layout::is_rendered;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::StoredEncoding;
+use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
+use mateval_dataset::work_folder::{WorkFolder, check_free, is_inside};
+use mateval_dataset::{Progress, Report, SceneError, json};
 
 use crate::error::BaselineError;
 

@@ -11,10 +11,10 @@ use std::path::Path;
 use glam::DVec2;
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::estimate::{Estimate, Placement, Region};
+use mateval_dataset::submission::StoredEncoding;
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::submission::StoredEncoding;
 
 /// Width and height of the input view.
 const VIEW: (usize, usize) = (480, 270);

@@ -7,7 +7,7 @@ use anyhow::{Context as _, bail};
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
-use mateval_scene::open::Dataset;
+use mateval_dataset::open::Dataset;
 
 use crate::terminal::{Outcome, counted, print, say};
 

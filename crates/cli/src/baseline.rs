@@ -16,7 +16,7 @@ use mateval_baselines::fill::FillRule;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, FitMode, ProceduralOptions, report_folder};
 use mateval_baselines::{bridges, homogeneous, submission};
-use mateval_scene::PartSetId;
+use mateval_dataset::PartSetId;
 
 use crate::arguments::{EstimateArgs, ExportPlaces, Places};
 use crate::terminal::{Outcome, counted, print, with_progress};

@@ -15,6 +15,8 @@ use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
 use mateval_baselines::{homogeneous, submission};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Finding, Severity, json, work_folder};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::protocol::Track;
@@ -28,8 +30,6 @@ use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
 use mateval_report::strips::Shown;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables, wrapped};
-use mateval_scene::open::Dataset;
-use mateval_scene::{Finding, Severity, json, work_folder};
 use serde::{Deserialize, Serialize};
 
 use crate::TOOL;

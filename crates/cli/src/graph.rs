@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use mateval_dataset::json;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_procedural::error::Finding;
 use mateval_procedural::evaluator::{Pixel, Square, render};
@@ -12,7 +13,6 @@ use mateval_procedural::mtlx::Limits;
 use mateval_procedural::mtlx::read_file;
 use mateval_procedural::value::Value;
 use mateval_procedural::{Graph, ProceduralError, Program, Settings};
-use mateval_scene::json;
 
 use crate::TOOL;
 use crate::arguments::{Format, check_output_file};

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use mateval_audit::compare::{CompareOptions, compare, report};
 use mateval_audit::stats;
+use mateval_dataset::work_folder::is_inside;
+use mateval_dataset::{SceneId, Severity, json};
 use mateval_image::store::write_whole;
-use mateval_scene::work_folder::is_inside;
-use mateval_scene::{SceneId, Severity, json};
 
 use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, samples_parser};
 use self::publish::{ExportArgs, MitsubaArgs, PublishArgs};

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use console::Term;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use mateval_dataset::{Finding, Progress, Report, Severity};
 use mateval_report::tables::wrapped;
-use mateval_scene::{Finding, Progress, Report, Severity};
 
 /// The name and version of this program, which datasets and results record, as in `mateval 0.1.0`.
 pub const TOOL: &str = concat!("mateval ", env!("CARGO_PKG_VERSION"));

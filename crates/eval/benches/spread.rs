@@ -13,12 +13,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_dataset::SceneId;
+use mateval_dataset::open::Dataset;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::{Metric, Surfaces, Views};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
-use mateval_scene::SceneId;
-use mateval_scene::open::Dataset;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();

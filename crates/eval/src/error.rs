@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use mateval_scene::ids::quoted;
-use mateval_scene::{SceneId, ViewId};
+use mateval_dataset::ids::quoted;
+use mateval_dataset::{SceneId, ViewId};
 
 /// Why something could not be scored or shown.
 #[derive(Debug, thiserror::Error)]
@@ -86,7 +86,7 @@ pub enum EvalError {
     InputNotTarget { scene: SceneId },
     /// The dataset or the submission could not be read.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// The submission could not be read.
     #[error(transparent)]
     Submission(#[from] mateval_submission::SubmissionError),

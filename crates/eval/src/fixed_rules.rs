@@ -5,9 +5,9 @@
 //! layers of LPIPS' network (whose hash is in the result). Nor are constants of the path tracer that decide only which
 //! of many equal estimates of an integral a seed stands for; the scorer's version rises with them.
 
+use mateval_dataset::submission::MAP_SIZES;
 use mateval_light::light_fit;
 use mateval_metrics::{Psnr, flip, lpips, ssim};
-use mateval_scene::submission::MAP_SIZES;
 use mateval_submission::{atlas, map_file, prediction, texel_map};
 use mateval_tracer::emitter::group_shares;
 use mateval_tracer::{emitter, noise_filter, world};
@@ -47,10 +47,10 @@ fixed_rules! {
     /// The largest difference between values of such places that agree.
     flat_range: f32 = mateval_tracer::aov::FLAT_RANGE,
     /// Surfaces of lower opacity are looked through in those pictures, as in the dataset's.
-    cut_out_below_opacity: f32 = mateval_scene::material::CUT_OUT_BELOW_OPACITY,
+    cut_out_below_opacity: f32 = mateval_dataset::material::CUT_OUT_BELOW_OPACITY,
     /// Value that replaces a missing or unsound base colour, linear. The format promises it to methods that leave maps
     /// out.
-    missing_base_color: f32 = mateval_scene::submission::GREY,
+    missing_base_color: f32 = mateval_dataset::submission::GREY,
     /// Value that replaces a missing or unsound roughness, as the format promises.
     missing_roughness: f32 = map_file::MISSING_ROUGHNESS,
     /// Value that replaces a missing or unsound metallic, as the format promises.

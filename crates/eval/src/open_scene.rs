@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{SceneFolder, is_rendered};
-use mateval_scene::open::Dataset;
-use mateval_scene::{RendererId, SceneError, TriangleMesh, glb, reference};
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::{SceneFolder, is_rendered};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{RendererId, SceneError, TriangleMesh, glb, reference};
 use mateval_tracer::World;
 
 use crate::error::EvalError;

@@ -8,9 +8,9 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::{InstanceId, SceneId, ViewId};
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Picture, exr_io};
-use mateval_scene::{InstanceId, SceneId, ViewId};
 
 use crate::error::EvalError;
 use crate::light::difference::{ViewGuide, guided_mean, mean_of};

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::SceneId;
+use mateval_dataset::material::PrincipledFlavour;
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_stage::StageRules;
 use mateval_metrics::mask_rule::MaskRule;
-use mateval_scene::SceneId;
-use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -113,7 +113,7 @@ impl Protocol {
 
     /// SHA-256, hex, of the protocol alone, as `dataset_spec/PROTOCOL.md` publishes it.
     pub fn sha256(&self) -> String {
-        mateval_scene::manifest::sha256_of_bytes(mateval_scene::json::to_text(self).as_bytes())
+        mateval_dataset::manifest::sha256_of_bytes(mateval_dataset::json::to_text(self).as_bytes())
     }
 
     /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, and the weights of LPIPS, which may
@@ -125,8 +125,8 @@ impl Protocol {
         lpips_weights_sha256: Option<&str>,
     ) -> String {
         let weights = lpips_weights_sha256.unwrap_or("missing");
-        let text = mateval_scene::json::to_text(&(self, dataset_manifest_sha256, scenes, weights));
-        mateval_scene::manifest::sha256_of_bytes(text.as_bytes())
+        let text = mateval_dataset::json::to_text(&(self, dataset_manifest_sha256, scenes, weights));
+        mateval_dataset::manifest::sha256_of_bytes(text.as_bytes())
     }
 }
 

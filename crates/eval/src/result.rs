@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::dataset::Perturbation;
+use mateval_dataset::open::DatasetId;
+use mateval_dataset::submission::Cost;
+use mateval_dataset::word_enum::UnknownWord;
+use mateval_dataset::{Finding, InstanceId, SceneId, ViewId, by_text};
 use mateval_light::light_fit::FittedRadiances;
-use mateval_scene::dataset::Perturbation;
-use mateval_scene::open::DatasetId;
-use mateval_scene::submission::Cost;
-use mateval_scene::word_enum::UnknownWord;
-use mateval_scene::{Finding, InstanceId, SceneId, ViewId, by_text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

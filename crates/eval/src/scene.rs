@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::{Progress, RendererId, SceneId, TriangleMesh, ViewId};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_fit::FittedRadiances;
 use mateval_metrics::{Lpips, MetricError};
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::{Progress, RendererId, SceneId, TriangleMesh, ViewId};
 use mateval_submission::prediction::PredictedScene;
 use mateval_tracer::World;
 use serde::{Deserialize, Serialize};

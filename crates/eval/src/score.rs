@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::BuildFolder;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::open::DatasetId;
+use mateval_dataset::render_file::{CompareCounts, CompareFile};
+use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
+use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
 use mateval_metrics::Lpips;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::BuildFolder;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::open::Dataset;
-use mateval_scene::open::DatasetId;
-use mateval_scene::render_file::{CompareCounts, CompareFile};
-use mateval_scene::submission::{Map, SUBMISSION, SubmissionFile};
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::files::SubmissionJson;
 use mateval_submission::files::{HashedFile, submission_sha256};
@@ -102,7 +102,7 @@ struct Outcome {
 /// use mateval_eval::protocol::Protocol;
 /// use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 /// use mateval_metrics::{Lpips, Net};
-/// use mateval_scene::open::Dataset;
+/// use mateval_dataset::open::Dataset;
 ///
 /// let dataset = Dataset::open(Path::new("dataset"))?;
 /// let lpips = Lpips::load(Net::Alex, Path::new("lpips-alex-v0.1.safetensors"))?;

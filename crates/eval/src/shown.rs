@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Progress, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::open::Dataset;
-use mateval_scene::{Progress, TriangleMesh};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 

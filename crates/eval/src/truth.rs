@@ -1,11 +1,11 @@
 //! The ground truth of a scene: its maps, read as a prediction's would be, and the pictures and masks of its views.
 
+use mateval_dataset::dataset::{Instance, SceneFile, View};
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::submission::Map;
+use mateval_dataset::{InstanceId, RendererId};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, Texture, Wrap, exr_io, png_io};
-use mateval_scene::dataset::{Instance, SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::submission::Map;
-use mateval_scene::{InstanceId, RendererId};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene, one_texel, scattering_key};
 
 use crate::error::EvalError;

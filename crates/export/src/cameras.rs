@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
+use mateval_dataset::{Camera, Intrinsics, json};
 use mateval_image::{Picture, exr_io, png_io};
-use mateval_scene::{Camera, Intrinsics, json};
 use serde::Serialize;
 
 use crate::dataset::{ExportError, ShownView, SoundDataset, copy_file, in_source, make_folder_of, write_file};

@@ -6,10 +6,10 @@
 
 use std::path::Path;
 
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::INPUT;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::{Progress, ViewId};
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::{Progress, ViewId};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -77,7 +77,7 @@ pub fn export(
     }
     write_file(&out.join(VIEWS), lines.as_bytes())?;
     let description = description(sound, publication, &tars, &lines);
-    write_file(&out.join(CROISSANT), mateval_scene::json::to_text(&description).as_bytes())?;
+    write_file(&out.join(CROISSANT), mateval_dataset::json::to_text(&description).as_bytes())?;
     Ok(exported)
 }
 

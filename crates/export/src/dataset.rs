@@ -4,12 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::{INPUT, MANIFEST};
+use mateval_dataset::manifest::{self, Entry, MISSING_FILE};
+use mateval_dataset::open::{Dataset, is_below};
+use mateval_dataset::{Camera, Finding, Progress, Report, SceneError, SceneId};
 use mateval_image::store::write_whole;
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{INPUT, MANIFEST};
-use mateval_scene::manifest::{self, Entry, MISSING_FILE};
-use mateval_scene::open::{Dataset, is_below};
-use mateval_scene::{Camera, Finding, Progress, Report, SceneError, SceneId};
 
 /// A format that a dataset can be written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +82,7 @@ pub enum ExportError {
     Parquet { path: PathBuf, source: parquet::errors::ParquetError },
     /// The dataset is not valid, or lacks scenes that the format needs, or the output could not be written.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),

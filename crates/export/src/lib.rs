@@ -14,8 +14,8 @@ pub mod tars;
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::work_folder::{WorkFolder, is_inside};
-use mateval_scene::{Progress, Report};
+use mateval_dataset::work_folder::{WorkFolder, is_inside};
+use mateval_dataset::{Progress, Report};
 
 pub use dataset::{ExportError, Exported, Format};
 use dataset::{ShownView, SoundDataset, shown_views, write_licence};

@@ -1,16 +1,16 @@
 //! One tar a scene and one for the rest of the dataset, with the same bytes on every machine.
 //!
 //! Unpacked in one folder, `base.tar` and any number of `scenes/<scene>.tar` are a dataset that
-//! [`Dataset::open`](mateval_scene::open::Dataset::open) accepts.
+//! [`Dataset::open`](mateval_dataset::open::Dataset::open) accepts.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use mateval_scene::layout::{COMPARE, DATASET, MANIFEST};
-use mateval_scene::manifest::hex;
-use mateval_scene::open::is_below;
-use mateval_scene::{Progress, Report};
+use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST};
+use mateval_dataset::manifest::hex;
+use mateval_dataset::open::is_below;
+use mateval_dataset::{Progress, Report};
 use sha2::{Digest as _, Sha256};
 
 use crate::dataset::{ExportError, Exported, SoundDataset, make_folder_of, write_file, write_licences};

@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DQuat, DVec2, DVec3};
+use mateval_dataset::dataset::DatasetFile;
+use mateval_dataset::manifest::{self, sha256_of_file};
+use mateval_dataset::open::DatasetId;
+use mateval_dataset::open::{Dataset, chosen_ids};
+use mateval_dataset::{Camera, SceneError, SceneId, json};
 use mateval_export::{ExportError, ExportOptions, Exported, Format, export};
 use mateval_image::exr_io;
-use mateval_scene::dataset::DatasetFile;
-use mateval_scene::manifest::{self, sha256_of_file};
-use mateval_scene::open::DatasetId;
-use mateval_scene::open::{Dataset, chosen_ids};
-use mateval_scene::{Camera, SceneError, SceneId, json};
 use mateval_testkit::packed::files;
 use mateval_testkit::{copy_folder, sample_dataset};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};

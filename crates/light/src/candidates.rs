@@ -7,11 +7,11 @@
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
+use mateval_dataset::Role;
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::material::TextureIndex;
+use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, SourceTexture, SurfaceIndex};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::Role;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::material::TextureIndex;
-use mateval_scene::reference::{Emission, LightGroup, ReferenceScene, SourceTexture, SurfaceIndex};
 
 /// The name of the group of all ceilings.
 pub const CEILINGS: &str = "ceilings";

@@ -10,8 +10,8 @@
 //! different rooms are different walls.
 
 use glam::{DVec2, DVec3, Vec3};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::{Camera, TriangleMesh};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_tracer::{Ray, StageLight, World};
 use serde::{Deserialize, Serialize};
 
@@ -405,8 +405,8 @@ fn frustum(camera: &Camera) -> [DVec3; 4] {
 mod tests {
     use std::sync::Arc;
 
-    use mateval_scene::dataset::{FORMAT, Instance, SceneSource, TrueMaterials, View};
-    use mateval_scene::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
+    use mateval_dataset::dataset::{FORMAT, Instance, SceneSource, TrueMaterials, View};
+    use mateval_dataset::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
     use mateval_testkit::scenes::{WALLS, box_camera, box_quad, box_room};
 
     use super::*;

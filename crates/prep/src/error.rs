@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use mateval_scene::dataset::PerturbationKind;
-use mateval_scene::ids::quoted;
-use mateval_scene::{SceneId, ViewId};
+use mateval_dataset::dataset::PerturbationKind;
+use mateval_dataset::ids::quoted;
+use mateval_dataset::{SceneId, ViewId};
 
 use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
@@ -130,7 +130,7 @@ pub enum PrepError {
     Tracer(#[from] mateval_tracer::TracerError),
     /// The dataset could not be read or written.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),

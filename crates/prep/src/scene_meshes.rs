@@ -1,9 +1,9 @@
 //! Compares the meshes of a finished scene, one for each instance and each part, with its `scene.json`.
 
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::glb::{self, GlbNode};
-use mateval_scene::layout::{SceneFolder, parts_file};
-use mateval_scene::{Finding, Severity};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::glb::{self, GlbNode};
+use mateval_dataset::layout::{SceneFolder, parts_file};
+use mateval_dataset::{Finding, Severity};
 
 use crate::error::PrepError;
 
@@ -118,7 +118,7 @@ pub fn part_values(folder: &SceneFolder, scene: &SceneFile) -> Result<Vec<Vec<u1
     let mut faults = Faults::default();
     let Some(meshes) = check(folder, scene, &mut faults) else {
         let path = folder.path().to_owned();
-        return Err(mateval_scene::SceneError::Invalid { path, findings: faults.all }.into());
+        return Err(mateval_dataset::SceneError::Invalid { path, findings: faults.all }.into());
     };
     let value = |part: &usize| scene.parts[*part].index.0.get();
     Ok(meshes.part_sets[0].iter().map(|of_triangles| of_triangles.iter().map(value).collect()).collect())

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use glam::DVec2;
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::material::Appearance;
+use mateval_dataset::reference::{Emission, ReferenceScene, SurfaceIndex};
+use mateval_dataset::{Camera, ViewId};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, png_io};
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::material::Appearance;
-use mateval_scene::reference::{Emission, ReferenceScene, SurfaceIndex};
-use mateval_scene::{Camera, ViewId};
 use mateval_tracer::World;
 use mateval_tracer::aov::{PixelHit, PixelMean, appearance, flatness_values, hit_through, is_veiled, subpixel};
 use rayon::prelude::*;
@@ -288,9 +288,9 @@ pub(crate) fn write_parts(
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::TriangleMesh;
-    use mateval_scene::material::TextureIndex;
-    use mateval_scene::reference::{EmissionMap, LightGroup, MaterialIndex, Surface};
+    use mateval_dataset::TriangleMesh;
+    use mateval_dataset::material::TextureIndex;
+    use mateval_dataset::reference::{EmissionMap, LightGroup, MaterialIndex, Surface};
 
     use super::*;
 

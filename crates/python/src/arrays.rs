@@ -5,10 +5,10 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use half::f16;
+use mateval_dataset::{Camera, SceneError};
 use mateval_image::limits::MAX_PIXELS;
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{ImageError, LinearRgb, Mask, Picture, SrgbRgb};
-use mateval_scene::{Camera, SceneError};
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods as _, PyUntypedArray, PyUntypedArrayMethods as _,
 };

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use mateval_scene::layout::INPUT;
-use mateval_scene::open;
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::open;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyIterator, PyList, PyType};

@@ -3,9 +3,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Role, SceneError, TriangleMesh, dataset, open, reference};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::{Role, SceneError, TriangleMesh, dataset, open, reference};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

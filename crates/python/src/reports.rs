@@ -6,12 +6,12 @@ use std::sync::{Arc, OnceLock};
 
 use anyhow::{Context as _, anyhow};
 use mateval_cli::{TOOL, find_weights};
+use mateval_dataset::open::Dataset as OpenDataset;
+use mateval_dataset::{Progress, SceneId, json};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::score::{LpipsWeights, ScorePlan};
 use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, MetricError, Net, Pixel, Psnr, mse, ssim_valid_windows};
-use mateval_scene::open::Dataset as OpenDataset;
-use mateval_scene::{Progress, SceneId, json};
 use mateval_submission::lint::{LintFile, LintPlan, lint as check, plain, refused};
 use mateval_submission::{SubmissionError, archive};
 use pyo3::exceptions::PyValueError;

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use mateval_baselines::submission::check_out;
+use mateval_dataset::dataset::Instance;
+use mateval_dataset::open::Dataset as OpenDataset;
+use mateval_dataset::submission::{
+    Cost, MAP_SIZES, Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, instance_folder,
+};
+use mateval_dataset::work_folder::WorkFolder;
+use mateval_dataset::{SceneError, SceneId, json};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, png_io};
-use mateval_scene::dataset::Instance;
-use mateval_scene::open::Dataset as OpenDataset;
-use mateval_scene::submission::{Cost, MAP_SIZES, Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, instance_folder};
-use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{SceneError, SceneId, json};
 use mateval_submission::map_file::{BASE_COLOR_RANGE, SCALAR_RANGE};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;

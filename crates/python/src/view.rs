@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use mateval_dataset::layout::{INPUT, part_picture};
+use mateval_dataset::{camera, dataset};
 use mateval_eval::EvalError;
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
-use mateval_scene::layout::{INPUT, part_picture};
-use mateval_scene::{camera, dataset};
 use numpy::ndarray::{ArrayD, Axis, IxDyn};
 use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _,

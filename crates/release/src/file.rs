@@ -9,9 +9,9 @@ use std::collections::BTreeSet;
 use std::str::FromStr;
 
 use mateval_audit::stats::StatsFile;
-use mateval_scene::dataset::DatasetFile;
-use mateval_scene::scene_cost::StepCost;
-use mateval_scene::{Finding, RendererId, SceneId, Severity};
+use mateval_dataset::dataset::DatasetFile;
+use mateval_dataset::scene_cost::StepCost;
+use mateval_dataset::{Finding, RendererId, SceneId, Severity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -170,7 +170,7 @@ pub struct Day(String);
 
 /// A text that is not a day.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{}' is not a day; expected one as in 2026-11-24", mateval_scene::findings::shortened(.0))]
+#[error("'{}' is not a day; expected one as in 2026-11-24", mateval_dataset::findings::shortened(.0))]
 pub struct BadDay(String);
 
 impl FromStr for Day {

@@ -8,6 +8,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_audit::stats::StatsFile;
+use mateval_dataset::dataset::{DatasetFile, SceneFile, Target};
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::manifest::{self, sha256_of_bytes};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::render_file::ScorerFile;
+use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
+use mateval_dataset::{RendererId, SceneError, SceneId, ViewId, json};
 use mateval_eval::light::reference::RELEASE_SAMPLES;
 use mateval_image::png_io::jpeg_bytes;
 use mateval_image::store::write_whole;
@@ -15,13 +22,6 @@ use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_prep::recipe::{self, RECIPE};
 use mateval_prep::render::RendererKind;
-use mateval_scene::dataset::{DatasetFile, SceneFile, Target};
-use mateval_scene::layout::INPUT;
-use mateval_scene::manifest::{self, sha256_of_bytes};
-use mateval_scene::open::Dataset;
-use mateval_scene::render_file::ScorerFile;
-use mateval_scene::render_file::{RENDER_FILE, RenderFile};
-use mateval_scene::{RendererId, SceneError, SceneId, ViewId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

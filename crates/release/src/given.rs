@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_audit::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, State};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
 use mateval_eval::EvalError;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::{Finding, SceneError, SceneId, Severity, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,7 @@ pub enum ReleaseError {
     OutputInDataset { path: PathBuf },
     /// The dataset, or a file of it, could not be read or written.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// The dataset could not be examined.
     #[error(transparent)]
     Audit(#[from] mateval_audit::AuditError),
@@ -375,7 +375,7 @@ fn fitting<T>(
 pub(crate) fn foreign(path: &Path, manifest: &str, dataset: &Dataset) -> Option<Finding> {
     let ours = &dataset.file.manifest_sha256;
     let message = || {
-        let found = mateval_scene::findings::shortened(manifest);
+        let found = mateval_dataset::findings::shortened(manifest);
         format!("it is about the dataset with manifest '{found}', and this one has '{ours}'")
     };
     (manifest != ours).then(|| unfit(path, "/dataset/manifest_sha256", message()))

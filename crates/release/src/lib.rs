@@ -23,11 +23,11 @@ use std::path::{Path, PathBuf};
 
 use mateval_audit::publish::commitment;
 use mateval_audit::{stats, verify};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::{WorkFolder, check_free, check_holds_none, is_inside};
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
 use mateval_image::store::write_whole;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::{WorkFolder, check_free, check_holds_none, is_inside};
-use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
 
 pub use file::{Publication, ReleaseFile};
 use file::{RELEASE, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, bibtex, withhold};

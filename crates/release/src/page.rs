@@ -2,8 +2,8 @@
 //!
 //! Its first lines are numbers at a glance, what fails, and what was not given.
 
+use mateval_dataset::{Finding, Severity};
 use mateval_report::page_style::{SORT, STYLE};
-use mateval_scene::{Finding, Severity};
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, context};
 use serde::Serialize;
@@ -241,9 +241,9 @@ mod tests {
 
     use mateval_audit::compare::file::State;
     use mateval_audit::stats::{CountedDataset, Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
+    use mateval_dataset::scene_cost::{Step, StepCost};
+    use mateval_dataset::{SceneId, SourceKind, ViewId};
     use mateval_eval::result::key::ResultKey;
-    use mateval_scene::scene_cost::{Step, StepCost};
-    use mateval_scene::{SceneId, SourceKind, ViewId};
 
     use crate::file::{NOT_SHOWN, Publication, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, withhold};
     use crate::gathered::{Evaluated, Remake, SceneInputs, ViewNoise};

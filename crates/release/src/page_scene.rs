@@ -2,10 +2,10 @@
 
 use mateval_audit::compare::file::State;
 use mateval_audit::stats::SceneStats;
+use mateval_dataset::scene_cost::{Step, StepCost};
+use mateval_dataset::{Finding, Severity};
 use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
-use mateval_scene::scene_cost::{Step, StepCost};
-use mateval_scene::{Finding, Severity};
 use serde::Serialize;
 
 use crate::file::{ReleaseFile, ReleasedScene};

@@ -4,10 +4,10 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use mateval_dataset::{Finding, SceneId};
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
-use mateval_scene::{Finding, SceneId};
 
 /// Why results could not be shown.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +47,7 @@ pub enum ReportError {
     TooManyHouses { houses: usize, most: usize },
     /// The dataset could not be read, or a file could not be read or written.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// A scene could not be rendered or scored again.
     #[error(transparent)]
     Eval(#[from] mateval_eval::EvalError),

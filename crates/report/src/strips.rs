@@ -3,16 +3,16 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::check_free;
+use mateval_dataset::{Progress, Report, SceneError, SceneId};
 use mateval_eval::protocol::{Protocol, SampleRules, Track};
 use mateval_eval::result::key::PictureKind;
 use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::check_free;
-use mateval_scene::{Progress, Report, SceneError, SceneId};
 
 use crate::error::ReportError;
 

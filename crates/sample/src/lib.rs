@@ -100,9 +100,9 @@ fn write_room(out: &Path) -> Result<(), SampleError> {
 mod tests {
     use std::collections::BTreeMap;
 
-    use mateval_scene::Severity;
-    use mateval_scene::material::{ConductorIor, MaterialModel};
-    use mateval_scene::reference::Emission;
+    use mateval_dataset::Severity;
+    use mateval_dataset::material::{ConductorIor, MaterialModel};
+    use mateval_dataset::reference::Emission;
     use mateval_sources::bitterli::{self, BitterliScene, Limits};
 
     use super::*;

@@ -9,8 +9,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
-use mateval_scene::TriangleMesh;
-use mateval_scene::reference::Surface;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::reference::Surface;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
@@ -414,8 +414,8 @@ fn triangles_apart(faces: &[Face], _of_face: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use glam::{Vec2, Vec3};
-    use mateval_scene::Role;
-    use mateval_scene::reference::MaterialIndex;
+    use mateval_dataset::Role;
+    use mateval_dataset::reference::MaterialIndex;
 
     use super::*;
 

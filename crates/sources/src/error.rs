@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::source_folder::{FileFault, SourceFolder};
+use mateval_dataset::source_folder::{FileFault, SourceFolder};
 
 use crate::bitterli::BitterliError;
 use crate::front3d::HouseError;

@@ -6,13 +6,13 @@
 use std::collections::BTreeMap;
 
 use glam::Vec2;
-use mateval_image::{Texels, Texture};
-use mateval_scene::TriangleMesh;
-use mateval_scene::findings::shortened;
-use mateval_scene::material::TextureIndex;
-use mateval_scene::reference::{
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::TextureIndex;
+use mateval_dataset::reference::{
     Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
+use mateval_image::{Texels, Texture};
 
 use crate::source_scene::{InstanceOrigin, Log};
 
@@ -182,8 +182,8 @@ pub(crate) fn mean_color(texture: &Texture) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use mateval_dataset::material::{ColorInput, Material, MaterialModel, UvTransform};
     use mateval_image::Wrap;
-    use mateval_scene::material::{ColorInput, Material, MaterialModel, UvTransform};
 
     use super::*;
     use crate::primitives::rectangle;

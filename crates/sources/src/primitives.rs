@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 
 /// Segments of a full circle.
 pub(crate) const SEGMENTS: u32 = 64;

@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
+use mateval_dataset::material::MaterialClass;
+use mateval_dataset::material::StatedParameters;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::source_folder::{FileFault, SourceFolder};
+use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 use mateval_image::ImageError;
-use mateval_scene::material::MaterialClass;
-use mateval_scene::material::StatedParameters;
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::source_folder::{FileFault, SourceFolder};
-use mateval_scene::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 
 /// A licence that must be passed on with the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]

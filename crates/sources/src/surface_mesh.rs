@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 
 use crate::source_scene::Log;
 

@@ -4,9 +4,9 @@
 use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::{SceneError, TriangleMesh, reference};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{SceneError, TriangleMesh, reference};
 
 /// By how much the square of texels that a place reads is larger on each side, in texels, for coordinates of up to 1;
 /// in proportion beyond. Lookups round to single precision: in the largest map they are off by up to a thousandth of a

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::{Finding, Severity};
+use mateval_dataset::{Finding, Severity};
 
 /// Why a submission could not be read or checked.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +31,7 @@ pub enum SubmissionError {
     UnsoundScene { scene_file: PathBuf, fault: SceneFault },
     /// The dataset or the submission could not be read.
     #[error(transparent)]
-    Dataset(#[from] mateval_scene::SceneError),
+    Dataset(#[from] mateval_dataset::SceneError),
     /// The tracer cannot work with the scene.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

@@ -9,10 +9,10 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, Map, SUBMISSION, SubmissionFile, instance_folder};
+use mateval_dataset::{InstanceId, SceneId};
 use mateval_image::limits::read_at_most;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::submission::{MAX_SUBMISSION_BYTES, Map, SUBMISSION, SubmissionFile, instance_folder};
-use mateval_scene::{InstanceId, SceneId};
 use serde::Serialize;
 
 use crate::error::{FileFault, SubmissionError};

@@ -7,12 +7,12 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use mateval_dataset::findings::shortened;
+use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
+use mateval_dataset::{SceneError, TriangleMesh};
 use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
 use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
 use mateval_image::{ImageError, Texels, Texture, texture_io};
-use mateval_scene::findings::shortened;
-use mateval_scene::submission::{GREY, MAP_SIZES, Map};
-use mateval_scene::{SceneError, TriangleMesh};
 
 use crate::atlas::{TexelSet, reached};
 use crate::error::FileFault;

@@ -6,12 +6,12 @@
 
 use std::path::Path;
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::Map;
+use mateval_dataset::{Finding, SceneError, SceneId, Severity};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::Map;
-use mateval_scene::{Finding, SceneError, SceneId, Severity};
 
 use crate::atlas::AtlasMeshes;
 use crate::error::{FileFault, SubmissionError, finding};
@@ -274,9 +274,9 @@ impl MemoryBudget {
 mod tests {
     use super::*;
     use glam::{Vec2, Vec3};
+    use mateval_dataset::TriangleMesh;
     use mateval_image::exr_io::{self, Precision};
     use mateval_image::{LinearRgb, Picture, png_io};
-    use mateval_scene::TriangleMesh;
     use serde_json::json;
     use std::collections::BTreeMap;
     use std::path::PathBuf;

@@ -1,10 +1,10 @@
 //! The texels of an instance's atlas on its surface: the area of each, and whether the input camera sees it.
 
 use glam::{DVec2, DVec3, Vec2};
-use mateval_scene::camera::Projection;
-use mateval_scene::material::CUT_OUT_BELOW_OPACITY;
-use mateval_scene::reference::SurfaceIndex;
-use mateval_scene::{Camera, TriangleMesh};
+use mateval_dataset::camera::Projection;
+use mateval_dataset::material::CUT_OUT_BELOW_OPACITY;
+use mateval_dataset::reference::SurfaceIndex;
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_tracer::{Hit, Ray, World};
 use rayon::prelude::*;
 
@@ -232,10 +232,10 @@ mod tests {
     use std::sync::Arc;
 
     use glam::Vec3;
+    use mateval_dataset::Intrinsics;
+    use mateval_dataset::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
+    use mateval_dataset::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};
     use mateval_image::{Texels, Texture, Wrap};
-    use mateval_scene::Intrinsics;
-    use mateval_scene::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
-    use mateval_scene::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};
 
     use super::*;
 

@@ -4,15 +4,15 @@
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
-use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::{LinearRgb, Picture, Wrap};
-use mateval_scene::material::{
+use mateval_dataset::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
-use mateval_scene::reference::{
+use mateval_dataset::reference::{
     Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{LinearRgb, Picture, Wrap};
 use serde_json::Value;
 
 use crate::shared_data;

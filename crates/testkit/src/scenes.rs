@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_image::Texture;
-use mateval_scene::material::{ColorInput, Material, MaterialModel, TextureIndex, UvTransform};
-use mateval_scene::reference::{
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, TextureIndex, UvTransform};
+use mateval_dataset::reference::{
     Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
+use mateval_image::Texture;
 use mateval_tracer::World;
 
 /// A parallelogram from `corner` along `u` and `v`; u x v points to its front.

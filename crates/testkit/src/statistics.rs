@@ -1,9 +1,9 @@
 //! Noisy pictures: statistics that compare them, and pictures whose expectation is known, for tests of metrics that
 //! remove noise.
 
+use mateval_dataset::Camera;
+use mateval_dataset::splitmix64::{INCREMENT, number};
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::Camera;
-use mateval_scene::splitmix64::{INCREMENT, number};
 use mateval_tracer::{RenderSettings, World, render};
 
 /// Independent renders of one view.

@@ -13,7 +13,7 @@ mod support;
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 
 use glam::{DVec2, Vec3};
-use mateval_scene::{Camera, TriangleMesh};
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_testkit::bench_scene;
 use mateval_tracer::{Accel, Ray, TriangleTest};
 

@@ -11,9 +11,9 @@ use std::process::Command;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_dataset::material::{ColorInput, Material, MaterialModel};
+use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
 /// The render of one process.

@@ -18,8 +18,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use mateval_scene::Camera;
-use mateval_scene::reference::ReferenceScene;
+use mateval_dataset::Camera;
+use mateval_dataset::reference::ReferenceScene;
 use mateval_testkit::bench_scene;
 use mateval_tracer::{RenderSettings, World, render};
 use rayon::ThreadPool;

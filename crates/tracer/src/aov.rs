@@ -1,9 +1,9 @@
 //! First hits at points of a picture, for the pictures that show no light: depth, normals, ids, materials.
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use mateval_scene::Camera;
-use mateval_scene::material::Appearance;
-use mateval_scene::reference::SurfaceIndex;
+use mateval_dataset::Camera;
+use mateval_dataset::material::Appearance;
+use mateval_dataset::reference::SurfaceIndex;
 
 use crate::ray::Hit;
 use crate::ray::Ray;
@@ -166,10 +166,10 @@ fn towards_camera(shading: DVec3, geometric: DVec3, direction: DVec3) -> Vec3 {
 mod tests {
     use std::sync::Arc;
 
+    use mateval_dataset::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
+    use mateval_dataset::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};
+    use mateval_dataset::{Intrinsics, TriangleMesh};
     use mateval_image::{Texels, Texture, Wrap};
-    use mateval_scene::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
-    use mateval_scene::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};
-    use mateval_scene::{Intrinsics, TriangleMesh};
 
     use super::*;
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use glam::Vec3;
-use mateval_scene::reference::{LightIndex, MaterialIndex, SurfaceIndex};
+use mateval_dataset::reference::{LightIndex, MaterialIndex, SurfaceIndex};
 
 /// Why something cannot be traced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! Path tracer for reference scenes.
 //!
-//! Input: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and one or more
-//! [`mateval_scene::Camera`]s.
+//! Input: a [`mateval_dataset::reference::ReferenceScene`] (surfaces, materials, textures, lights) and one or more
+//! [`mateval_dataset::Camera`]s.
 //!
 //! Output: pictures of linear radiance ([`render()`]), the same per view and per group of lights ([`render_views`]),
 //! with predicted materials in place of the scene's own ([`render_repainted`]), and first hits ([`World::first_hit`],

@@ -3,9 +3,9 @@
 //! Light is linear in emission, so any other lighting by the same emitters is a weighted sum of these pictures. All of
 //! them come from the same paths, since no decision along a path depends on radiance ([`crate::emitter`]).
 
+use mateval_dataset::Camera;
+use mateval_dataset::reference::LightIndex;
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::Camera;
-use mateval_scene::reference::LightIndex;
 
 use crate::error::{ExceededLimit, RequestFault, TracerError};
 
@@ -152,7 +152,7 @@ impl LightBasis {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::Intrinsics;
+    use mateval_dataset::Intrinsics;
 
     use super::*;
 

@@ -182,7 +182,7 @@ mod tests {
         fn halves(&self, noise: f32) -> [Picture<LinearRgb>; 2] {
             [1, 2].map(|seed| {
                 Picture::from_fn(SIDE, SIDE, |x, y| {
-                    let number = mateval_scene::splitmix64::number(seed, (y * SIDE + x) as u64);
+                    let number = mateval_dataset::splitmix64::number(seed, (y * SIDE + x) as u64);
                     let unit = (number >> 40) as f32 / (1 << 23) as f32 - 1.0;
                     let light = if x < SIDE / 2 { 1.0 } else { 1.3 };
                     LinearRgb(self.base_color.get(x, y).0.map(|v| v * (light + noise * unit)))

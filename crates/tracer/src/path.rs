@@ -4,7 +4,7 @@
 //! both by multiple importance sampling with the power heuristic (Veach 1997, section 9.2). Nothing is clamped.
 
 use glam::{Vec2, Vec3};
-use mateval_scene::reference::LightIndex;
+use mateval_dataset::reference::LightIndex;
 
 use crate::bsdf::{Bsdf, BsdfPart};
 use crate::emitter::Emitted;

@@ -1,8 +1,8 @@
 //! Rays, what they hit, and the points on surfaces where the next rays start.
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_scene::TriangleMesh;
-use mateval_scene::reference::SurfaceIndex;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::reference::SurfaceIndex;
 
 /// Unit vectors stay well below this.
 const LARGEST_DIRECTION: f32 = 1e3;

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec2;
+use mateval_dataset::Camera;
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::Camera;
 use rayon::prelude::*;
 
 use crate::error::TracerError;
@@ -51,9 +51,9 @@ pub struct Render {
 /// use std::sync::Arc;
 ///
 /// use glam::{DVec3, Vec3};
-/// use mateval_scene::material::{ColorInput, Material, MaterialModel};
-/// use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface};
-/// use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+/// use mateval_dataset::material::{ColorInput, Material, MaterialModel};
+/// use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface};
+/// use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
 /// use mateval_tracer::{RenderSettings, World, render};
 ///
 /// let mesh = TriangleMesh {

@@ -9,10 +9,10 @@ use std::array::from_fn;
 use std::ops::Range;
 
 use glam::{Vec2, Vec3};
+use mateval_dataset::material::PrincipledFlavour;
+use mateval_dataset::reference::{Surface, SurfaceIndex};
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::Texture;
-use mateval_scene::material::PrincipledFlavour;
-use mateval_scene::reference::{Surface, SurfaceIndex};
-use mateval_scene::{Camera, TriangleMesh};
 
 use crate::accel::{prefetch, prefetch_line};
 use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};

@@ -8,7 +8,7 @@
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 use glam::{Vec2, Vec3};
-use mateval_scene::splitmix64;
+use mateval_dataset::splitmix64;
 
 /// The random numbers of one sample of one pixel.
 #[derive(Clone, Copy, Debug)]

@@ -15,10 +15,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use glam::{DVec2, Vec2, Vec3};
+use mateval_dataset::Camera;
+use mateval_dataset::camera::Projection;
+use mateval_dataset::material::PrincipledFlavour;
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_scene::Camera;
-use mateval_scene::camera::Projection;
-use mateval_scene::material::PrincipledFlavour;
 use rayon::prelude::*;
 
 use crate::aov::hit_through;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use glam::{DVec2, Vec2, Vec3};
+use mateval_dataset::material::{CUT_OUT_BELOW_OPACITY, FRACTIONAL_OPACITY, Lookup, Material};
+use mateval_dataset::reference::{ReferenceScene, Surface, SurfaceIndex};
+use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
 use mateval_image::Texture;
-use mateval_scene::material::{CUT_OUT_BELOW_OPACITY, FRACTIONAL_OPACITY, Lookup, Material};
-use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::accel::{Accel, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};

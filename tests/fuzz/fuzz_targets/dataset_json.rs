@@ -2,9 +2,9 @@
 //! `scene.json`, `dataset.json`, `targets.json`, `reference.json` and `lights.json`.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
-use mateval_scene::json;
-use mateval_scene::reference::{LightsFile, ReferenceFile};
+use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
+use mateval_dataset::json;
+use mateval_dataset::reference::{LightsFile, ReferenceFile};
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("scene.json", bytes, |path| {

@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use mateval_scene::TriangleMesh;
-use mateval_scene::submission::Map;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::submission::Map;
 use mateval_submission::map_file::decode;
 use mateval_submission::files::SubmittedFile;
 

@@ -2,7 +2,7 @@
 //! Reads meshes from binary glTF: triangles must refer to existing vertices.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_scene::glb;
+use mateval_dataset::glb;
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("a.glb", bytes, |path| {

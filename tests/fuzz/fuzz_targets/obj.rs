@@ -2,7 +2,7 @@
 //! Reads an OBJ mesh and an MTL: triangles must refer to existing vertices.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_scene::obj::{self, Materials, ObjLimits};
+use mateval_dataset::obj::{self, Materials, ObjLimits};
 
 fuzz_target!(|bytes: &[u8]| {
     let limits = ObjLimits { triangles: 100_000, corners: 300_000 };

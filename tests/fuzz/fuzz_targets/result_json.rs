@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use mateval_eval::result::ResultFile;
 use mateval_report::tables::{Grouping, TableFormat, tables};
-use mateval_scene::json;
+use mateval_dataset::json;
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("RESULT.json", bytes, |path| {

@@ -2,8 +2,8 @@
 //! Reads `submission.json` as scoring and as `eval lint` do: both must accept the same files.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_scene::Severity;
-use mateval_scene::submission::SUBMISSION;
+use mateval_dataset::Severity;
+use mateval_dataset::submission::SUBMISSION;
 use mateval_submission::lint::submission_json;
 use mateval_submission::files::SubmissionJson;
 

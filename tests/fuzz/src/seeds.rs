@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_image::exr_io::{Precision, write_linear, write_scalar};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::{TriangleMesh, glb, obj};
+use mateval_dataset::{TriangleMesh, glb, obj};
 
 /// A scene with a textured triangle, every kind of light and a camera.
 const LIT: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2,3]}],

@@ -1,9 +1,9 @@
 //! `compare.json`: how far two renderers' pictures of a dataset agree; the kinds of material by how far two renderers
 //! may differ on them; and the bounds, with the reason of each.
 
-use mateval_scene::material::MaterialModel;
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{SceneId, ViewId};
+use mateval_dataset::material::MaterialModel;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::{SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
 //! Compares the pictures without light: base colours, ids, depths, normals.
 
+use mateval_dataset::dataset::View;
+use mateval_dataset::layout::SceneFolder;
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_metrics::{Psnr, mse};
 use mateval_prep::views::base_color_at_centres;
-use mateval_scene::dataset::View;
-use mateval_scene::layout::SceneFolder;
 use mateval_tracer::World;
 
 use super::file::{BASE_COLOR_PSNR_DB, Check, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG, Quantity, State};

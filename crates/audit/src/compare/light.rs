@@ -442,8 +442,8 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use mateval_dataset::splitmix64;
     use mateval_image::{LinearRgb, Mask, Normal, Picture};
-    use mateval_scene::splitmix64;
 
     use super::*;
     use crate::compare::file::{GROUP_SUM, LAMBERT_TILE, MaterialKind, Quantity, State};

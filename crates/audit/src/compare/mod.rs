@@ -17,18 +17,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::{BuildFolder, COMPARE, SceneFolder};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::render_file;
+use mateval_dataset::render_file::RENDER_FILE;
+use mateval_dataset::render_file::{CompareCounts, VERDICT_FORMAT};
+use mateval_dataset::work_folder::{WorkFolder, check_free, is_inside};
+use mateval_dataset::{Progress, Report, SceneId, json, reference};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Psnr;
 use mateval_prep::render::RendererKind;
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{BuildFolder, COMPARE, SceneFolder};
-use mateval_scene::open::Dataset;
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::render_file;
-use mateval_scene::render_file::RENDER_FILE;
-use mateval_scene::render_file::{CompareCounts, VERDICT_FORMAT};
-use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
-use mateval_scene::{Progress, Report, SceneId, json, reference};
 use mateval_tracer::World;
 
 use self::file::{

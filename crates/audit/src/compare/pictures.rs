@@ -5,12 +5,12 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::View;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
+use mateval_dataset::{Camera, Progress, Report, SceneId, json};
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
 use mateval_prep::render::MAX_BOUNCES;
-use mateval_scene::dataset::View;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::render_file::{RENDER_FILE, RenderFile};
-use mateval_scene::{Camera, Progress, Report, SceneId, json};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 

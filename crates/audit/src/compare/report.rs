@@ -3,12 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::ViewId;
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::progress::{Table, row};
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Normal, Picture};
-use mateval_scene::ViewId;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::progress::{Table, row};
 use minijinja::value::Serde;
 use minijinja::{Environment, context};
 use serde::Serialize;

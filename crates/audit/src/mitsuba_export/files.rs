@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 
 use glam::Vec3;
-use mateval_scene::{Finding, Severity, TriangleMesh};
+use mateval_dataset::{Finding, Severity, TriangleMesh};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec2, Vec2};
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, Surface, SurfaceIndex};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, Texture};
-use mateval_scene::TriangleMesh;
-use mateval_scene::reference::{Emission, LightGroup, ReferenceScene, Surface, SurfaceIndex};
 
 use super::files::{Element, Remarks};
 use super::materials::radiance_map;

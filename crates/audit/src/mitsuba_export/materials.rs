@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_image::exr_io::{self, Precision};
-use mateval_image::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap, png_io};
-use mateval_scene::material::{
+use mateval_dataset::material::{
     ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
     UvTransform,
 };
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap, png_io};
 
 use super::files::{Element, Remarks};
 

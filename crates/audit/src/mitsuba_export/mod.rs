@@ -15,15 +15,15 @@ mod materials;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use mateval_dataset::dataset::View;
+use mateval_dataset::material::Material;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::reference::{ReferenceScene, Surface};
+use mateval_dataset::work_folder::{WorkFolder, check_free};
+use mateval_dataset::{Camera, Finding, SceneId, ViewId, reference};
 use mateval_image::Texture;
 use mateval_image::store::write_whole;
 use mateval_prep::recipe::{self, RECIPE};
-use mateval_scene::dataset::View;
-use mateval_scene::material::Material;
-use mateval_scene::open::Dataset;
-use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{Camera, Finding, SceneId, ViewId, reference};
 use mateval_tracer::RenderSettings;
 
 use self::files::{Element, Remarks, SCENE_FILE, Sheet};
@@ -113,7 +113,7 @@ fn write_scene(
     }
     let glows = lights::glows(folder, scene, &textures, remarks)?;
     for (index, surface) in scene.surfaces.iter().enumerate() {
-        let glow = glows.get(&mateval_scene::reference::SurfaceIndex(index));
+        let glow = glows.get(&mateval_dataset::reference::SurfaceIndex(index));
         for shape in write_surface(folder, index, surface, glow, remarks)? {
             document = document.child(shape);
         }
@@ -256,12 +256,12 @@ fn reach(scene: &ReferenceScene, from: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec2, Vec3};
-    use mateval_image::{LinearRgb, Texels, Wrap, exr_io};
-    use mateval_scene::material::{
+    use mateval_dataset::material::{
         ColorInput, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
     };
-    use mateval_scene::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, SourceTexture, SurfaceIndex};
-    use mateval_scene::{Intrinsics, Severity, TriangleMesh};
+    use mateval_dataset::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, SourceTexture, SurfaceIndex};
+    use mateval_dataset::{Intrinsics, Severity, TriangleMesh};
+    use mateval_image::{LinearRgb, Texels, Wrap, exr_io};
 
     use super::*;
 

@@ -8,12 +8,12 @@ pub mod show;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_scene::dataset::SUPER_CATEGORIES;
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::layout::DATASET;
-use mateval_scene::material::MaterialParameter;
-use mateval_scene::open::Dataset;
-use mateval_scene::{Finding, FindingCount, Role, SceneError, SceneId, Severity, SourceKind};
+use mateval_dataset::dataset::SUPER_CATEGORIES;
+use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::layout::DATASET;
+use mateval_dataset::material::MaterialParameter;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Finding, FindingCount, Role, SceneError, SceneId, Severity, SourceKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -360,8 +360,8 @@ pub(crate) fn shown(name: &str, most: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile, TrueMaterials};
-    use mateval_scene::{InstanceId, InstanceIndex, SceneLights};
+    use mateval_dataset::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile, TrueMaterials};
+    use mateval_dataset::{InstanceId, InstanceIndex, SceneLights};
     use proptest::prelude::*;
 
     use super::show::{picture, text};

@@ -4,9 +4,9 @@
 //! Positions and texts of the chart are computed here; the template `picture.j2` turns them into markup and escapes
 //! every name. The same counts give the same bytes.
 
-use mateval_scene::Severity;
-use mateval_scene::dataset::SUPER_CATEGORIES;
-use mateval_scene::progress::{Table, row};
+use mateval_dataset::Severity;
+use mateval_dataset::dataset::SUPER_CATEGORIES;
+use mateval_dataset::progress::{Table, row};
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;

@@ -7,15 +7,15 @@ mod scene;
 use std::path::Path;
 use std::sync::Arc;
 
+use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
+use mateval_dataset::ids::quoted;
+use mateval_dataset::layout::BuildFolder;
+use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
+use mateval_dataset::material::MaterialClassesFile;
+use mateval_dataset::open::{absent_scenes, is_below};
+use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
 use mateval_prep::scene_meshes;
 use mateval_prep::scene_meshes::Faults;
-use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
-use mateval_scene::ids::quoted;
-use mateval_scene::layout::BuildFolder;
-use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use mateval_scene::material::MaterialClassesFile;
-use mateval_scene::open::{absent_scenes, is_below};
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
 

@@ -4,14 +4,14 @@
 
 use std::path::Path;
 
+use mateval_dataset::dataset::{DatasetFile, Photo, SceneFile};
+use mateval_dataset::layout::{INPUT, SCORER_JSON, SceneFolder};
+use mateval_dataset::manifest::sha256_of_file;
+use mateval_dataset::render_file::RenderFile;
+use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
+use mateval_dataset::{Finding, RendererId, Severity, json};
 use mateval_image::{LinearRgb, exr_io};
 use mateval_prep::scene_meshes::Faults;
-use mateval_scene::dataset::{DatasetFile, Photo, SceneFile};
-use mateval_scene::layout::{INPUT, SCORER_JSON, SceneFolder};
-use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
-use mateval_scene::{Finding, RendererId, Severity, json};
 
 use super::scene::check_schema;
 
@@ -153,8 +153,8 @@ pub(super) fn check_scorer(
 mod tests {
     use std::collections::BTreeMap;
 
-    use mateval_scene::dataset::FORMAT;
-    use mateval_scene::{RendererId, manifest};
+    use mateval_dataset::dataset::FORMAT;
+    use mateval_dataset::{RendererId, manifest};
 
     use super::*;
 

@@ -6,17 +6,17 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::DMat3;
+use mateval_dataset::dataset::{Part, SceneFile, View, WideView};
+use mateval_dataset::glb::GlbNode;
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::material::{ColorInput, Material, MaterialModel};
+use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_dataset::submission::Map;
+use mateval_dataset::{Camera, ViewId};
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_prep::scene_meshes::Faults;
 use mateval_prep::scene_meshes::Meshes;
-use mateval_scene::dataset::{Part, SceneFile, View, WideView};
-use mateval_scene::glb::GlbNode;
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-use mateval_scene::submission::Map;
-use mateval_scene::{Camera, ViewId};
 use schemars::JsonSchema;
 
 /// Checks `folder/file` against the schema of `T`. Every violation is a fault with its JSON pointer.

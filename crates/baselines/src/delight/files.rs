@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::WorkFolder;
+use mateval_dataset::{Progress, Report, SceneError, json};
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Progress, Report, SceneError, json};
 use serde::{Deserialize, Serialize};
 
 use super::room::FittedLight;

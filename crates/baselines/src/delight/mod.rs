@@ -15,9 +15,9 @@ pub mod relight;
 mod room;
 mod surfaces;
 
+use mateval_dataset::{Progress, Report};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::joint_fit::{JointFitRules, JointTarget, fit_jointly};
-use mateval_scene::{Progress, Report};
 use mateval_tracer::noise_filter::{self, filtered_mean};
 use mateval_tracer::{PhotoCache, SplitLight, split_light};
 
@@ -298,12 +298,14 @@ mod tests {
     use std::sync::Arc;
 
     use glam::Vec2;
-    use mateval_image::{Normal, Texels, Texture, Wrap};
-    use mateval_scene::material::{
+    use mateval_dataset::material::{
         ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
     };
-    use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
-    use mateval_scene::{Camera, Intrinsics, TriangleMesh, splitmix64};
+    use mateval_dataset::reference::{
+        Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex,
+    };
+    use mateval_dataset::{Camera, Intrinsics, TriangleMesh, splitmix64};
+    use mateval_image::{Normal, Texels, Texture, Wrap};
     use mateval_testkit::scenes::{box_camera, box_quad, box_room};
     use mateval_tracer::{RenderSettings, World, aov, render};
 

@@ -9,14 +9,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::WorkFolder;
+use mateval_dataset::{Progress, Report, SceneError, json};
 use mateval_image::exr_io::{Precision, read_linear, read_scalar, write_linear};
 use mateval_image::png_io::jpeg_bytes;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Progress, Report, SceneError, json};
 use mateval_tracer::{PhotoCache, SplitLight, split_light};
 
 use super::files::{LIGHTS_FORMAT, LightsFile, exposed};

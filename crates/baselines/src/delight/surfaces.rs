@@ -7,8 +7,8 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::{Progress, Report};
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_scene::{Progress, Report};
 use mateval_tracer::{AssumedSurfaces, PhotoCache, RenderSettings, split_light};
 
 use super::room::{NO_PART, PartRoom};

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::{DVec3, Vec2, Vec3};
+use mateval_dataset::material::MaterialParameter;
 use mateval_image::Texture;
-use mateval_scene::material::MaterialParameter;
 
 use super::error::{ImportError, Limited, MAX_TRIANGLES};
 use crate::estimate::{GivenMaps, Values};

@@ -1,10 +1,10 @@
 //! Why a file of an import was refused, and the largest files that are imported.
 
+use mateval_dataset::findings::shortened;
+use mateval_dataset::gltf_file::GltfError;
+use mateval_dataset::obj::ObjError;
+use mateval_dataset::source_folder::FileFault;
 use mateval_image::ImageError;
-use mateval_scene::findings::shortened;
-use mateval_scene::gltf_file::GltfError;
-use mateval_scene::obj::ObjError;
-use mateval_scene::source_folder::FileFault;
 
 /// Largest number of triangles in a file.
 pub const MAX_TRIANGLES: usize = 5_000_000;

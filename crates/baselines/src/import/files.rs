@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::{InstanceId, PartSetId, SceneId, json};
+use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::source_folder::SourceFolder;
+use mateval_dataset::{InstanceId, PartSetId, SceneId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 
 use super::donor::Donor;
 use super::rebake::Correspondence;
@@ -348,7 +348,7 @@ pub fn orders_of_axes() -> Vec<DMat3> {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::splitmix64::number;
+    use mateval_dataset::splitmix64::number;
 
     use super::*;
 

@@ -8,12 +8,12 @@ use glam::{DMat4, DVec3, Mat2, Vec2, Vec3};
 use gltf::Semantic;
 use gltf::material::PbrSpecularGlossiness;
 use gltf::mesh::Mode;
+use mateval_dataset::gltf_file::{GltfFile, INSTANCING, parse};
+use mateval_dataset::gltf_file::{first_numbers, indices, numbers, triangles, view_bytes};
+use mateval_dataset::source_folder::SourceFolder;
+use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
-use mateval_scene::gltf_file::{GltfFile, INSTANCING, parse};
-use mateval_scene::gltf_file::{first_numbers, indices, numbers, triangles, view_bytes};
-use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
 use super::error::{
@@ -380,8 +380,8 @@ fn wrap(sampler: &gltf::texture::Sampler<'_>) -> Result<Wrap, ImportError> {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::material::MaterialParameter;
-    use mateval_scene::{TriangleMesh, glb};
+    use mateval_dataset::material::MaterialParameter;
+    use mateval_dataset::{TriangleMesh, glb};
 
     use super::*;
 

@@ -20,10 +20,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DVec3;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::material::MaterialParameter;
-use mateval_scene::open::Dataset;
-use mateval_scene::{InstanceId, PartSetId, Progress, Report};
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::material::MaterialParameter;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{InstanceId, PartSetId, Progress, Report};
 
 use crate::error::BaselineError;
 use crate::estimate::GivenMaps;

@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
+use mateval_dataset::obj::{self, Materials, ObjLimits, ObjMaterial};
+use mateval_dataset::source_folder::SourceFolder;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texture, Wrap};
-use mateval_scene::obj::{self, Materials, ObjLimits, ObjMaterial};
-use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
 use super::error::{ImportError, Limited, MAX_TEXELS, MAX_TRIANGLES, Place, Unsupported};

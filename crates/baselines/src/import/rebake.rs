@@ -2,9 +2,9 @@
 //! of the donor's surface.
 
 use glam::DVec3;
+use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::mesh::nearest_weights;
 use mateval_image::Picture;
-use mateval_scene::mesh::UvAtlas;
-use mateval_scene::mesh::nearest_weights;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 

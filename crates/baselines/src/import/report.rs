@@ -1,7 +1,7 @@
 //! The report of an import, `IMPORT.json`: how much of each instance was covered, and how its files were placed.
 
-use mateval_scene::material::MaterialParameter;
-use mateval_scene::{InstanceId, SceneId};
+use mateval_dataset::material::MaterialParameter;
+use mateval_dataset::{InstanceId, SceneId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

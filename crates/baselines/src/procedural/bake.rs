@@ -1,9 +1,9 @@
 //! Bakes the materials of parts into the atlases of their instances.
 
 use glam::{DVec2, DVec3};
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::mesh::UvAtlas;
 use mateval_image::{Mask, Picture};
-use mateval_scene::TriangleMesh;
-use mateval_scene::mesh::UvAtlas;
 use rayon::prelude::*;
 
 use super::materials::{PartMaterial, Residuals, SceneMaterials, completed};

@@ -13,6 +13,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
+use mateval_dataset::dataset::Instance;
+use mateval_dataset::{PartSetId, Progress, Report};
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter, LEAST_POINTS};
 use mateval_procedural::fit::paper::fit_as_paper;
@@ -20,8 +22,6 @@ use mateval_procedural::fit::{Point, split};
 use mateval_procedural::graph::slots;
 use mateval_procedural::library::Class;
 use mateval_procedural::value::Type;
-use mateval_scene::dataset::Instance;
-use mateval_scene::{PartSetId, Progress, Report};
 use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;

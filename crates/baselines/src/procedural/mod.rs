@@ -18,14 +18,14 @@ mod report;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::{WorkFolder, check_free};
+use mateval_dataset::{Progress, SceneError, json};
 use mateval_image::png_io;
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
 use mateval_procedural::library::entry;
 use mateval_procedural::mtlx::{Limits, read_file};
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{Progress, SceneError, json};
 
 use crate::error::BaselineError;
 use crate::estimate::Estimate;

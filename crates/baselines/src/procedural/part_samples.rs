@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use mateval_dataset::{Camera, PartSetId};
 use mateval_procedural::fit::Point;
 use mateval_procedural::noise::cell;
-use mateval_scene::{Camera, PartSetId};
 
 use super::part_frame::{Chart, PartFrame, Triangle};
 use crate::error::BaselineError;
@@ -139,7 +139,7 @@ fn corners_of_parts(geometry: &SceneGeometry<'_>, triangles: &PartTriangles<'_>)
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::Intrinsics;
+    use mateval_dataset::Intrinsics;
 
     use super::*;
 

@@ -5,15 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
+use mateval_dataset::SceneError;
+use mateval_dataset::dataset::{Part, SceneFile};
+use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_procedural::Graph;
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::library::{Class, LIBRARY};
 use mateval_procedural::mtlx::to_text_of_all;
-use mateval_scene::SceneError;
-use mateval_scene::dataset::{Part, SceneFile};
-use mateval_scene::manifest::sha256_of_bytes;
 use serde::Serialize;
 
 use super::materials::{PartMaterial, Reason, SceneMaterials};

@@ -7,7 +7,7 @@ use anyhow::bail;
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::encoding_fit::{FittedEncoding, LEAST_EXPLAINED, Verdict, best_explained};
 use mateval_baselines::encoding_report::{self, EncodingReport, MapEncoding, Reading};
-use mateval_scene::json;
+use mateval_dataset::json;
 
 use crate::arguments::{Format, open_dataset};
 use crate::terminal::{Outcome, print, with_progress};

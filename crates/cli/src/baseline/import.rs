@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use anyhow::bail;
 use mateval_baselines::import::{self, FlatMaterial, ImportOptions, ImportReport, ImportedFrame, ImportedInstance};
 use mateval_baselines::submission::Method;
-use mateval_scene::material::MaterialParameter;
-use mateval_scene::{PartSetId, json};
+use mateval_dataset::material::MaterialParameter;
+use mateval_dataset::{PartSetId, json};
 
 use crate::arguments::{Format, Places};
 use crate::terminal::{Outcome, print, say, with_progress};

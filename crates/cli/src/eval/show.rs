@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::builder::PossibleValue;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Track;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::PictureKind;
@@ -13,8 +15,6 @@ use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, write};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
-use mateval_scene::open::Dataset;
-use mateval_scene::{SceneId, json};
 
 use crate::TOOL;
 use crate::arguments::Format;

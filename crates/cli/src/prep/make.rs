@@ -5,6 +5,9 @@ use std::time::Duration;
 
 use anyhow::{Context as _, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mateval_dataset::SceneId;
+use mateval_dataset::dataset::PerturbationKind;
+use mateval_dataset::work_folder::check_free;
 use mateval_eval::light::reference::{RELEASE_SAMPLES, ReferenceOptions, make_references};
 use mateval_prep::build::BuildOptions;
 use mateval_prep::build::finish::bring_up_to_date;
@@ -15,9 +18,6 @@ use mateval_prep::render::{BlenderOptions, BlenderProgram, RenderOptions, Render
 use mateval_prep::survey::rules::{RejectionLists, SelectionRules};
 use mateval_prep::survey::selection::SelectionGoal;
 use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, survey};
-use mateval_scene::SceneId;
-use mateval_scene::dataset::PerturbationKind;
-use mateval_scene::work_folder::check_free;
 use mateval_sources::front3d::camera_rules::CameraRules;
 
 use crate::TOOL;
@@ -433,7 +433,7 @@ pub struct FinishArgs {
 
 impl FinishArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let finish = |progress: mateval_scene::Progress<'_>| {
+        let finish = |progress: mateval_dataset::Progress<'_>| {
             mateval_prep::build::finish::finish(&self.dataset, &self.without, TOOL, progress)
         };
         let dataset = with_progress(finish).context("cannot finish the dataset")?;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use mateval_audit::mitsuba_export::{self, export_view};
 use mateval_audit::publish::publish;
+use mateval_dataset::work_folder::is_inside;
+use mateval_dataset::{SceneId, Severity, ViewId};
 use mateval_export::{ExportOptions, Exported, Format, croissant, export};
 use mateval_release::file::Day;
 use mateval_release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
-use mateval_scene::work_folder::is_inside;
-use mateval_scene::{SceneId, Severity, ViewId};
 
 use crate::TOOL;
 use crate::prep::make::samples_parser;

@@ -20,7 +20,7 @@ mod noise;
 mod ours;
 mod stage;
 
-use mateval_scene::{Camera, Intrinsics};
+use mateval_dataset::{Camera, Intrinsics};
 use mateval_testkit::bench_scene;
 use noise::{Noise, disagreement};
 use stage::{Stage, find};

@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 
-use mateval_scene::Camera;
+use mateval_dataset::Camera;
 use serde_json::{Value, json};
 
 use crate::FIT_SIZE;

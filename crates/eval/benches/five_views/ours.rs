@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use mateval_dataset::Camera;
 use mateval_image::{LinearRgb, Picture};
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_fit::{FitTarget, fit_lights};
-use mateval_scene::Camera;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 
 use crate::FIT_SIZE;

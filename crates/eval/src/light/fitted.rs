@@ -6,10 +6,10 @@
 //! the render, so that the noise of the fit adds no bias to the squared error; the difference of the errors under
 //! either fit shows its noise. The truth is another renderer's picture, so nothing travels along and nothing is exact.
 
+use mateval_dataset::{Camera, RendererId, SceneLights};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
 use mateval_light::light_stage;
-use mateval_scene::{Camera, RendererId, SceneLights};
 use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
 use rayon::prelude::*;
 

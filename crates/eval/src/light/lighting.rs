@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use mateval_dataset::by_text;
+use mateval_dataset::word_enum::UnknownWord;
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
-use mateval_scene::by_text;
-use mateval_scene::word_enum::UnknownWord;
 use mateval_tracer::LightMix;
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,9 @@
 //! Predictions under the scene's own emitters, compared with R.
 
+use mateval_dataset::Camera;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
 use mateval_light::light_fit::FittedRadiances;
 use mateval_metrics::mask_rule::ReferenceFeatures;
-use mateval_scene::Camera;
 use mateval_tracer::noise_filter::Surfaces;
 use mateval_tracer::{LightMix, ViewsRender, World};
 use rayon::prelude::*;

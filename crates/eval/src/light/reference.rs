@@ -8,17 +8,17 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::SCORER_JSON;
+use mateval_dataset::manifest::change_scene;
+use mateval_dataset::manifest::sha256_of_file;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
+use mateval_dataset::scene_cost::{Step, TimedStep};
+use mateval_dataset::work_folder::WorkFolder;
+use mateval_dataset::{Camera, Progress, Report, SceneId, json, scene_cost};
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::SCORER_JSON;
-use mateval_scene::manifest::change_scene;
-use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::open::Dataset;
-use mateval_scene::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
-use mateval_scene::scene_cost::{Step, TimedStep};
-use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Camera, Progress, Report, SceneId, json, scene_cost};
 use mateval_tracer::{LightGroups, Lighting, World};
 
 use crate::error::EvalError;
@@ -284,7 +284,7 @@ pub(crate) fn weighted(
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::layout::INPUT;
+    use mateval_dataset::layout::INPUT;
     use mateval_testkit::sample_dataset::dataset;
     use mateval_testkit::{copy_folder, kept_folder};
 

@@ -1,8 +1,8 @@
 //! The metrics of predictions under light: of each region of every view, and of each instance.
 
+use mateval_dataset::{Camera, SceneId};
 use mateval_image::{Mask, Picture};
 use mateval_metrics::{MetricError, Psnr, flip};
-use mateval_scene::{Camera, SceneId};
 use mateval_tracer::shared_centre::noise_blocks;
 use rayon::prelude::*;
 

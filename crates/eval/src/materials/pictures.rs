@@ -3,8 +3,8 @@
 use std::cell::LazyCell;
 
 use glam::Vec2;
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::{Camera, TriangleMesh};
 use mateval_submission::prediction::PredictedScene;
 use mateval_tracer::aov::{
     COARSE_SUBPIXELS, PixelMean, SUBPIXELS, appearance, coarse_subpixels, flatness_values, places_through, subpixel,

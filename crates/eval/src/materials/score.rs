@@ -1,12 +1,12 @@
 //! The maps of submissions compared with the truth's in pictures, without light: the metrics of each region, of base
 //! colour also with its scale removed.
 
+use mateval_dataset::Report;
+use mateval_dataset::dataset::View;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::alignment::{channel_scales, scaled};
 use mateval_metrics::mask_rule::ReferenceFeatures;
 use mateval_metrics::{Lpips, MetricError, Psnr, delta_e, mse};
-use mateval_scene::Report;
-use mateval_scene::dataset::View;
 use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
@@ -308,7 +308,7 @@ pub(crate) fn round_to_steps(protocol: &Protocol, value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::{SceneId, ViewId};
+    use mateval_dataset::{SceneId, ViewId};
 
     use crate::result::key::{PictureKind, PictureName, Region};
 

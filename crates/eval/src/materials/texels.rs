@@ -9,13 +9,13 @@
 
 use std::path::Path;
 
+use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::reference::SurfaceIndex;
+use mateval_dataset::submission::MAP_SIZES;
+use mateval_dataset::{Progress, Report, TriangleMesh};
 use mateval_image::exr_io::Precision;
 use mateval_image::{Texture, exr_io};
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::reference::SurfaceIndex;
-use mateval_scene::submission::MAP_SIZES;
-use mateval_scene::{Progress, Report, TriangleMesh};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
 use mateval_tracer::World;
@@ -170,10 +170,10 @@ mod tests {
     use std::sync::Arc;
 
     use glam::{DVec3, Vec2};
+    use mateval_dataset::material::{ColorInput, Material, MaterialModel};
+    use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
+    use mateval_dataset::{Camera, InstanceId, Intrinsics, SceneId};
     use mateval_image::{Picture, Texels, Wrap, png_io};
-    use mateval_scene::material::{ColorInput, Material, MaterialModel};
-    use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-    use mateval_scene::{Camera, InstanceId, Intrinsics, SceneId};
     use mateval_submission::atlas::AtlasMeshes;
     use mateval_submission::prediction::read_scene;
     use serde_json::json;

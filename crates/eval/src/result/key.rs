@@ -5,14 +5,14 @@ use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 
+use mateval_dataset::ViewId;
+use mateval_dataset::submission::Map;
 use mateval_metrics::Net;
-use mateval_scene::ViewId;
-use mateval_scene::submission::Map;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use mateval_scene::word_enum::{UnknownWord, quoted};
-use mateval_scene::{by_text, word_enum};
+use mateval_dataset::word_enum::{UnknownWord, quoted};
+use mateval_dataset::{by_text, word_enum};
 
 /// The better direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -224,7 +224,7 @@ impl Views {
             Region::Valid if view.is_wide() => Self::Wide,
             Region::Unobserved if view.is_wide() => Self::WideUnobserved,
             Region::Unobserved => Self::Unobserved,
-            Region::Valid if view.as_str() == mateval_scene::layout::INPUT => Self::Input,
+            Region::Valid if view.as_str() == mateval_dataset::layout::INPUT => Self::Input,
             Region::Valid => Self::Novel,
         }
     }

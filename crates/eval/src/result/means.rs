@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::SceneId;
 use mateval_metrics::Psnr;
-use mateval_scene::SceneId;
 
 use crate::result::key::{Metric, PictureKind, ResultKey, Views};
 use crate::result::{InstanceTexelErrors, PictureValues};
@@ -95,7 +95,7 @@ impl Mean {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::{InstanceId, ViewId};
+    use mateval_dataset::{InstanceId, ViewId};
 
     use crate::result::TexelErrors;
     use crate::result::key::{PictureName, Region};

@@ -5,13 +5,13 @@
 
 use std::sync::{Arc, LazyLock};
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::{Camera, TriangleMesh, glb, reference};
 use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Picture};
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_fit::{FitTarget, fit_lights};
 use mateval_light::light_stage::{self, NamedLight};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::{Camera, TriangleMesh, glb, reference};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
@@ -90,7 +90,7 @@ impl Staged {
     }
 }
 
-fn flavour() -> mateval_scene::material::PrincipledFlavour {
+fn flavour() -> mateval_dataset::material::PrincipledFlavour {
     hasty().light.flavour
 }
 

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
+use mateval_dataset::Camera;
+use mateval_dataset::open::Dataset;
 use mateval_eval::EvalError;
 use mateval_eval::light::lighting::lightings;
 use mateval_eval::protocol::Protocol;
@@ -11,8 +13,6 @@ use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::Metric;
 use mateval_eval::score::{ScorePlan, score};
 use mateval_light::light_stage;
-use mateval_scene::Camera;
-use mateval_scene::open::Dataset;
 use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::World;
 use mateval_tracer::shared_centre::noise_blocks;

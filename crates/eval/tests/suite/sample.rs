@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use mateval_dataset::SceneId;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_metrics::{Lpips, Net};
-use mateval_scene::SceneId;
 use mateval_testkit::lpips_weights;
 pub use mateval_testkit::sample_dataset::{built, dataset, write_changed, write_grey, write_truth};
 
@@ -46,5 +46,5 @@ pub fn scored(plan: &ScorePlan<'_>) -> Vec<ResultFile> {
 
 /// The text of `RESULT.json`.
 pub fn text(result: &ResultFile) -> String {
-    mateval_scene::json::to_text(result)
+    mateval_dataset::json::to_text(result)
 }

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use mateval_baselines::homogeneous;
+use mateval_dataset::json;
+use mateval_dataset::open::Dataset;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::{RESULT_FORMAT, ResultFile};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Picture, Wrap, png_io};
-use mateval_scene::json;
-use mateval_scene::open::Dataset;
 use serde_json::Value;
 
 use super::sample::built;

@@ -6,11 +6,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::work_folder::{keep_below, mark_used};
 use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
-use mateval_scene::TriangleMesh;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::work_folder::{keep_below, mark_used};
 
 use super::packing::{AtlasError, AtlasLayout, SizeWish};
 

@@ -7,7 +7,7 @@
 pub mod cache;
 mod packing;
 
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 
 use cache::{AtlasCache, ShapeKey};
 use packing::packed;

@@ -3,7 +3,7 @@
 //! The result is a layout: where the triangles of a shape lie in its atlas, apart from the shape's place in a scene.
 
 use glam::Vec2;
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 use serde::{Deserialize, Serialize};
 use uvunwrap::{Density, MeshInput, Options, Packing};
 

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::{Finding, Severity, json};
+use mateval_dataset::{Finding, Severity, json};
 use serde::{Deserialize, Serialize};
 
 use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};

@@ -12,12 +12,12 @@ mod process;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::material::Material;
+use mateval_dataset::reference::WrapWord;
+use mateval_dataset::reference::{LightGroup, ReferenceScene, Surface};
+use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture};
-use mateval_scene::material::Material;
-use mateval_scene::reference::WrapWord;
-use mateval_scene::reference::{LightGroup, ReferenceScene, Surface};
-use mateval_scene::{Camera, SceneId, TriangleMesh, ViewId, json};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 

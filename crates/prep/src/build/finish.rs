@@ -11,17 +11,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use mateval_dataset::dataset::{DatasetFile, FORMAT, PREVIOUS_FORMAT, SceneFile, Target, TargetsFile};
+use mateval_dataset::layout::BuildFolder;
+use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS, is_rendered};
+use mateval_dataset::manifest::SceneHashes;
+use mateval_dataset::manifest::change_scene;
+use mateval_dataset::manifest::{self, sha256_of_bytes, sha256_of_file};
+use mateval_dataset::open::check_whole;
+use mateval_dataset::render_file::RENDER_FILE;
+use mateval_dataset::work_folder::{self, remove};
+use mateval_dataset::{Progress, RendererId, Report, SceneError, SceneId, json};
 use mateval_image::store::write_whole;
-use mateval_scene::dataset::{DatasetFile, FORMAT, PREVIOUS_FORMAT, SceneFile, Target, TargetsFile};
-use mateval_scene::layout::BuildFolder;
-use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS, is_rendered};
-use mateval_scene::manifest::SceneHashes;
-use mateval_scene::manifest::change_scene;
-use mateval_scene::manifest::{self, sha256_of_bytes, sha256_of_file};
-use mateval_scene::open::check_whole;
-use mateval_scene::render_file::RENDER_FILE;
-use mateval_scene::work_folder::{self, remove};
-use mateval_scene::{Progress, RendererId, Report, SceneError, SceneId, json};
 use serde::Deserialize;
 
 use super::start::{SceneMark, is_build, settings_sha256};
@@ -393,7 +393,7 @@ fn format_of(bytes: &[u8]) -> Option<String> {
 mod tests {
     use std::path::PathBuf;
 
-    use mateval_scene::open::Dataset;
+    use mateval_dataset::open::Dataset;
     use mateval_testkit::sample_dataset;
     use mateval_testkit::{copy_folder, kept_folder};
 

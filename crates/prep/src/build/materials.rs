@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, Vec2};
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::material::{Appearance, Material};
+use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::submission::Map;
+use mateval_dataset::{Finding, Progress, Report, Severity, TriangleMesh};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{Picture, Texture, png_io};
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::material::{Appearance, Material};
-use mateval_scene::mesh::UvAtlas;
-use mateval_scene::submission::Map;
-use mateval_scene::{Finding, Progress, Report, Severity, TriangleMesh};
 use rayon::prelude::*;
 
 use super::parts::InstanceEntry;
@@ -369,8 +369,8 @@ fn mean_appearance(
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use mateval_dataset::material::{ColorInput, MaterialModel, TextureIndex, UvTransform};
     use mateval_image::{Texels, Wrap};
-    use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex, UvTransform};
 
     use crate::atlas::unwrap;
 

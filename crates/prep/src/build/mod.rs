@@ -17,16 +17,16 @@ pub(crate) mod start;
 
 use std::path::Path;
 
-use mateval_scene::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SceneSource, SourceFile};
-use mateval_scene::glb::{self, GlbNode};
-use mateval_scene::layout::BuildFolder;
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::manifest::SceneHashes;
-use mateval_scene::material::MaterialClassesFile;
-use mateval_scene::reference::Surface;
-use mateval_scene::scene_cost::{self, Step, TimedStep};
-use mateval_scene::work_folder::{WorkFolder, remove, remove_beside};
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference};
+use mateval_dataset::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SceneSource, SourceFile};
+use mateval_dataset::glb::{self, GlbNode};
+use mateval_dataset::layout::BuildFolder;
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::manifest::SceneHashes;
+use mateval_dataset::material::MaterialClassesFile;
+use mateval_dataset::reference::Surface;
+use mateval_dataset::scene_cost::{self, Step, TimedStep};
+use mateval_dataset::work_folder::{WorkFolder, remove, remove_beside};
+use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference};
 use mateval_sources::source_scene::LicenceText;
 
 use crate::atlas::cache::AtlasCache;

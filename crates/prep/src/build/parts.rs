@@ -10,12 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU16;
 use std::path::Path;
 
-use mateval_scene::dataset::Part;
-use mateval_scene::findings::shortened;
-use mateval_scene::ids::{PartIndex, id_text_from};
-use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::source_folder::{FileFault, SourceFolder};
-use mateval_scene::{Finding, InstanceId, InstanceIndex, PartId, PartSetId, Role, Severity, TriangleMesh};
+use mateval_dataset::dataset::Part;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::ids::{PartIndex, id_text_from};
+use mateval_dataset::reference::{ReferenceScene, Surface};
+use mateval_dataset::source_folder::{FileFault, SourceFolder};
+use mateval_dataset::{Finding, InstanceId, InstanceIndex, PartId, PartSetId, Role, Severity, TriangleMesh};
 use mateval_sources::npy::{self, NpyError};
 use mateval_sources::source_scene::InstanceOrigin;
 use mateval_sources::surface_mesh::{MAX_PARTS, connected_parts, parts_of_labels};
@@ -290,7 +290,7 @@ pub(crate) fn file_names(folder: &Path) -> std::io::Result<BTreeSet<String>> {
 fn labels_of_instance(
     folder: &mut SourceFolder,
     file: &str,
-    mesh: &mateval_scene::TriangleMesh,
+    mesh: &mateval_dataset::TriangleMesh,
 ) -> Result<Option<Vec<usize>>, LabelFault> {
     let triangles = mesh.triangles.len();
     let named = || file.to_owned();
@@ -324,7 +324,7 @@ fn labels_of_instance(
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use mateval_scene::reference::MaterialIndex;
+    use mateval_dataset::reference::MaterialIndex;
     use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish};
     use npyz::WriterBuilder as _;
 

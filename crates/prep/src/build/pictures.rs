@@ -6,11 +6,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use mateval_dataset::camera::{Camera, Intrinsics};
+use mateval_dataset::layout::{INPUT, SceneFolder, part_picture};
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, ViewId};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::png_io;
-use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
-use mateval_scene::{Finding, Progress, Report, SceneId, Severity, ViewId};
 use mateval_sources::source_scene::Missing;
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 

@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use glam::DVec3;
+use mateval_dataset::camera::{Camera, Intrinsics};
+use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, StatedParameters, TextureIndex};
+use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
+use mateval_dataset::source_folder::SourceFolder;
+use mateval_dataset::{Progress, Report, Role, SceneLights, SourceKind, ViewId};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap};
-use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::dataset::{Photo, PhotoEncoding, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, StatedParameters, TextureIndex};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
-use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::{Progress, Report, Role, SceneLights, SourceKind, ViewId};
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{InstanceOrigin, Missing, SourceScene};

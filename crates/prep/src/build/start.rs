@@ -6,11 +6,11 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::dataset::{Licence, SceneFile, SourceFile};
-use mateval_scene::layout::{BUILD, BuildFolder};
-use mateval_scene::layout::{DATASET, SceneFolder};
-use mateval_scene::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
-use mateval_scene::{SceneId, json, manifest};
+use mateval_dataset::dataset::{Licence, SceneFile, SourceFile};
+use mateval_dataset::layout::{BUILD, BuildFolder};
+use mateval_dataset::layout::{DATASET, SceneFolder};
+use mateval_dataset::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
+use mateval_dataset::{SceneId, json, manifest};
 use mateval_sources::below::relative_below;
 use serde::{Deserialize, Serialize};
 

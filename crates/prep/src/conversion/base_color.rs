@@ -5,10 +5,10 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
+use mateval_dataset::reference::SourceTexture;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{Texels, Texture};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
-use mateval_scene::reference::SourceTexture;
 use mateval_tracer::MaterialFault;
 use mateval_tracer::bsdf::ReflectanceMeter;
 

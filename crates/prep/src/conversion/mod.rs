@@ -9,12 +9,12 @@
 
 mod base_color;
 
-use mateval_scene::material::{
+use mateval_dataset::material::{
     ColorInput, ConductorIor, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
 };
-use mateval_scene::reference::SourceMaterials;
-use mateval_scene::reference::{Emission, MaterialIndex, ReferenceScene};
-use mateval_scene::{Finding, Severity};
+use mateval_dataset::reference::SourceMaterials;
+use mateval_dataset::reference::{Emission, MaterialIndex, ReferenceScene};
+use mateval_dataset::{Finding, Severity};
 use mateval_tracer::bsdf::ReflectanceMeter;
 use mateval_tracer::repaint::SPECULAR;
 use mateval_tracer::{MaterialFault, SceneFault, TracerError};
@@ -224,7 +224,7 @@ impl Converter<'_> {
             severity,
             code: code.to_owned(),
             file: self.file.to_owned(),
-            place: format!("material '{}'", mateval_scene::findings::shortened(&material.name)),
+            place: format!("material '{}'", mateval_dataset::findings::shortened(&material.name)),
             message: message.to_owned(),
             action: action.to_owned(),
         });
@@ -241,10 +241,10 @@ fn even_roughness(microfacets: Option<Microfacets>) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use mateval_dataset::TriangleMesh;
+    use mateval_dataset::material::{BumpMap, Distribution, TextureIndex, UvTransform};
+    use mateval_dataset::reference::{LightGroup, SourceTexture, Surface};
     use mateval_image::{Texels, Texture, Wrap};
-    use mateval_scene::TriangleMesh;
-    use mateval_scene::material::{BumpMap, Distribution, TextureIndex, UvTransform};
-    use mateval_scene::reference::{LightGroup, SourceTexture, Surface};
 
     use super::*;
 

@@ -11,14 +11,14 @@ use std::num::NonZeroU16;
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_scene::dataset::{DatasetFile, Instance, SceneFile};
-use mateval_scene::dataset::{Perturbation, PerturbationKind, PerturbedGeometry};
-use mateval_scene::glb::{self, GlbNode};
-use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, part_picture};
-use mateval_scene::open::Dataset;
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::work_folder::{WorkFolder, check_holds_none};
-use mateval_scene::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
+use mateval_dataset::dataset::{DatasetFile, Instance, SceneFile};
+use mateval_dataset::dataset::{Perturbation, PerturbationKind, PerturbedGeometry};
+use mateval_dataset::glb::{self, GlbNode};
+use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, part_picture};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::work_folder::{WorkFolder, check_holds_none};
+use mateval_dataset::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
 use mateval_tracer::World;
 
 use crate::error::PrepError;

@@ -5,9 +5,9 @@
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec3};
-use mateval_scene::dataset::PerturbationKind;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::{InstanceId, SceneId, TriangleMesh, splitmix64};
+use mateval_dataset::dataset::PerturbationKind;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::{InstanceId, SceneId, TriangleMesh, splitmix64};
 use mateval_tracer::{Accel, Ray, TracerError};
 
 /// How far a level moves every piece of furniture.

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use mateval_scene::findings::shortened;
-use mateval_scene::{PartSetId, SceneError, SceneId, ViewId};
+use mateval_dataset::findings::shortened;
+use mateval_dataset::{PartSetId, SceneError, SceneId, ViewId};
 use mateval_sources::below::BelowError;
 
 /// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers

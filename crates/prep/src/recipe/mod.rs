@@ -9,10 +9,10 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use mateval_dataset::ViewId;
+use mateval_dataset::dataset::TrueMaterials;
 use mateval_image::limits::read_at_most;
 use mateval_image::limits::{hint, mistaken_for, without_mark};
-use mateval_scene::ViewId;
-use mateval_scene::dataset::TrueMaterials;
 use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
@@ -100,7 +100,7 @@ impl Recipe {
     }
 
     fn check_views(&self, faults: &mut Vec<RecipeFault>) {
-        let mut seen = BTreeSet::from([mateval_scene::layout::INPUT]);
+        let mut seen = BTreeSet::from([mateval_dataset::layout::INPUT]);
         let wide = self.wide.iter().flat_map(WideViews::given_ids);
         for id in self.views.iter().map(|view| &view.id).chain(wide) {
             if !seen.insert(id.as_str()) {

@@ -9,11 +9,11 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_file::RenderNoise;
-use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference};
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::render_file::RenderFile;
+use mateval_dataset::render_file::RenderNoise;
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, reference};
 
 use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
 use crate::blender::{

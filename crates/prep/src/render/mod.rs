@@ -14,14 +14,14 @@ pub(crate) mod run;
 use std::path::Path;
 use std::sync::Arc;
 
+use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, View};
+use mateval_dataset::layout::BuildFolder;
+use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder};
+use mateval_dataset::open::chosen_ids;
+use mateval_dataset::render_file::RenderFile;
+use mateval_dataset::render_file::RenderNoise;
+use mateval_dataset::{Progress, Report, SceneId, json, reference};
 use mateval_image::{ImageError, Picture, exr_io, png_io};
-use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, View};
-use mateval_scene::layout::BuildFolder;
-use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder};
-use mateval_scene::open::chosen_ids;
-use mateval_scene::render_file::RenderFile;
-use mateval_scene::render_file::RenderNoise;
-use mateval_scene::{Progress, Report, SceneId, json, reference};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 

@@ -5,15 +5,15 @@
 use std::path::Path;
 use std::str::FromStr;
 
+use mateval_dataset::dataset::View;
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::manifest::change_scene;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
+use mateval_dataset::scene_cost::{self, Step, TimedStep};
+use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::dataset::View;
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::manifest::change_scene;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::render_file::{RENDER_FILE, RenderFile};
-use mateval_scene::scene_cost::{self, Step, TimedStep};
-use mateval_scene::{Finding, RendererId, SceneId, ViewId, json};
 
 use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 
 use glam::{DVec2, Vec2};
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::camera::{Camera, Intrinsics};
+use mateval_dataset::ids::id_text_from;
 use mateval_image::Picture;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
-use mateval_scene::TriangleMesh;
-use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::ids::id_text_from;
 use mateval_sources::front3d::FurnishedHouse;
 use mateval_sources::front3d::camera_sampler::{CameraError, RoomSampler, score, score_grid};
 use mateval_tracer::World;

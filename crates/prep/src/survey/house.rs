@@ -7,12 +7,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::SourceFile;
+use mateval_dataset::lease::{self, Lease};
+use mateval_dataset::manifest::{sha256_of_bytes, sha256_of_file};
+use mateval_dataset::work_folder::{WorkFolder, check_free, remove, remove_beside};
+use mateval_dataset::{FindingCount, SceneError, ids, json};
 use mateval_image::png_io::write_rgb_bytes;
-use mateval_scene::dataset::SourceFile;
-use mateval_scene::lease::{self, Lease};
-use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
-use mateval_scene::work_folder::{WorkFolder, check_free, remove, remove_beside};
-use mateval_scene::{FindingCount, SceneError, ids, json};
 use mateval_sources::front3d::{self, AppearanceRule, FurnishedHouse, HouseFiles};
 use serde::{Deserialize, Serialize};
 

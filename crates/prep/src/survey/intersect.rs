@@ -15,7 +15,7 @@ use std::cell::RefCell;
 use std::sync::OnceLock;
 
 use glam::{Quat, Vec3};
-use mateval_scene::TriangleMesh;
+use mateval_dataset::TriangleMesh;
 use mateval_tracer::{Accel, Ray, TracerError};
 use rayon::prelude::*;
 

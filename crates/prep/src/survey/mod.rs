@@ -20,7 +20,7 @@ mod survey_file;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::{Progress, Report};
+use mateval_dataset::{Progress, Report};
 use mateval_sources::below::{common_folder, relative_below};
 
 use crate::error::PrepError;

@@ -7,9 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::SourceFile;
+use mateval_dataset::json;
 use mateval_image::store::write_whole;
-use mateval_scene::dataset::SourceFile;
-use mateval_scene::json;
 use minijinja::value::Serde;
 use minijinja::{Environment, context};
 use serde::Serialize;

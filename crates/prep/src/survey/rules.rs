@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::manifest;
 use mateval_image::limits::read_at_most;
-use mateval_scene::manifest;
 use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 

@@ -1,6 +1,6 @@
 //! `survey.json`: every room that was searched, and the cameras offered in it.
 
-use mateval_scene::FindingCount;
+use mateval_dataset::FindingCount;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

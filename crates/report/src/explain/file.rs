@@ -1,7 +1,7 @@
 //! The explanation of one scene, as `mateval eval explain --format json` prints it.
 
+use mateval_dataset::{Finding, InstanceId, SceneId, ViewId};
 use mateval_eval::result::key::{PictureKind, Views};
-use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -15,6 +15,10 @@ pub mod text;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::check_free;
+use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, ViewId};
 use mateval_eval::open_scene::scored_views;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::key::Metric;
@@ -25,10 +29,6 @@ use mateval_image::store::write_whole;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_metrics::Psnr;
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::check_free;
-use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, ViewId};
 use mateval_submission::prediction::{HashedSubmission, hashed_submission};
 use rayon::prelude::*;
 
@@ -335,10 +335,10 @@ impl Area {
 mod tests {
     //! Planted errors of each kind are recognised as that kind.
 
+    use mateval_dataset::InstanceId;
     use mateval_eval::protocol::Protocol;
     use mateval_eval::result::InstancePixelErrors;
     use mateval_eval::result::key::Views;
-    use mateval_scene::InstanceId;
 
     use super::file::KindShares;
     use super::kinds::blurred;
@@ -577,7 +577,7 @@ mod tests {
             protocol: "mateval-3".to_owned(),
             fingerprint: String::new(),
             scene: SceneId::new("s").unwrap(),
-            views: vec![mateval_scene::ViewId::new("input").unwrap()],
+            views: vec![mateval_dataset::ViewId::new("input").unwrap()],
             pixels: 12,
             unobserved_pixels: 3,
             mse: 0.01,

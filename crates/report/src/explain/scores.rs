@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::{InstanceId, SceneId};
 use mateval_eval::materials::score::{Albedo, albedo_mse};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
@@ -11,7 +12,6 @@ use mateval_eval::shown::SceneAlbedo;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::alignment::scaled;
 use mateval_metrics::{MetricError, Psnr};
-use mateval_scene::{InstanceId, SceneId};
 
 use super::file::{AlignedBy, AlignmentScores, LightShare};
 use super::kinds::best_scale;

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use mateval_scene::ViewId;
-use mateval_scene::progress::Table;
+use mateval_dataset::ViewId;
+use mateval_dataset::progress::Table;
 
 use mateval_eval::result::key::{PictureKind, Views};
 

@@ -1,10 +1,10 @@
 //! Everything that the pages of a leaderboard are made from.
 
+use mateval_dataset::SceneId;
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::open::DatasetId;
 use mateval_eval::result::key::PictureKind;
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_scene::SceneId;
-use mateval_scene::layout::INPUT;
-use mateval_scene::open::DatasetId;
 use serde::Serialize;
 
 use super::columns::{self, Column, MethodHead, standing};

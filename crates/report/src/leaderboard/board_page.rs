@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_dataset::{SceneId, json};
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile, TracerCheck};
-use mateval_scene::{SceneId, json};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;

@@ -1,10 +1,10 @@
 //! The columns of the board and their cells: one column for each key of the results, chosen by picture, views, metric
 //! and surfaces, and one for each fact about methods. Also how pages name a method.
 
+use mateval_dataset::submission::{Cost, Map};
 use mateval_eval::result::key::{Better, Metric};
 use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_scene::submission::{Cost, Map};
 use serde::Serialize;
 
 use super::entries::Verified;

@@ -3,13 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_dataset::dataset::PerturbationKind;
+use mateval_dataset::dataset::WideView;
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::{SceneId, ViewId};
 use mateval_eval::result::PictureValues;
 use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::PictureName;
-use mateval_scene::dataset::PerturbationKind;
-use mateval_scene::dataset::WideView;
-use mateval_scene::layout::INPUT;
-use mateval_scene::{SceneId, ViewId};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;

@@ -4,16 +4,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::manifest::sha256_of_file;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Finding, SceneError, Severity, json};
 use mateval_eval::EvalError;
 use mateval_eval::result::key::{Region, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
 use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::findings::shortened;
-use mateval_scene::layout::INPUT;
-use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::open::Dataset;
-use mateval_scene::{Finding, SceneError, Severity, json};
 use mateval_submission::lint::submission_json::check_method_name;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

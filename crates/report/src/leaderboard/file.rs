@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::submission::Cost;
 use mateval_eval::result::key::ResultKey;
-use mateval_scene::submission::Cost;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

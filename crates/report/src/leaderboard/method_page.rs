@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::SceneId;
 use mateval_eval::result::InstancePixelErrors;
 use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::{PictureKind, ResultKey, Views};
-use mateval_scene::SceneId;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;

@@ -24,8 +24,8 @@ mod site;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{Progress, Report};
+use mateval_dataset::work_folder::{WorkFolder, check_free};
+use mateval_dataset::{Progress, Report};
 
 use self::board::Board;
 pub use self::entries::{LeaderboardPlan, Submissions};
@@ -100,11 +100,11 @@ fn site(board: &Board<'_>) -> Site {
 mod tests {
     //! A small site of invented results; tests in a browser are in `tests/site`.
 
+    use mateval_dataset::json;
+    use mateval_dataset::manifest::sha256_of_file;
+    use mateval_dataset::submission::Cost;
     use mateval_eval::result::{ResultFile, TracerCheck};
     use mateval_image::{Picture, png_io};
-    use mateval_scene::json;
-    use mateval_scene::manifest::sha256_of_file;
-    use mateval_scene::submission::Cost;
 
     use super::entries::{Verified, verification_of};
     use super::file::LeaderboardFile;
@@ -141,7 +141,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (set, out) = (folder.path().join("set"), folder.path().join("site"));
         let results = three();
-        let view = mateval_scene::ViewId::new("input").unwrap();
+        let view = mateval_dataset::ViewId::new("input").unwrap();
         for (method, kind) in
             [("good", "albedo"), ("good", "albedo-error"), (pictures::TRUTH, "albedo"), ("no id", "x")]
         {

@@ -7,12 +7,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::{Progress, Report, SceneError, SceneId, ViewId};
 use mateval_eval::open_scene::scored_views;
 use mateval_eval::result::key::PictureKind;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, SrgbRgb, png_io};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::{Progress, Report, SceneError, SceneId, ViewId};
 use mateval_submission::prediction::HashedFiles;
 use serde::Serialize;
 

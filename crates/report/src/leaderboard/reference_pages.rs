@@ -78,7 +78,7 @@ fn write_protocol(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Report
 fn rules_of(protocol: &Protocol) -> Vec<(String, String)> {
     let mut rules = Vec::new();
     // From its JSON text, which gives single-precision numbers with as few digits as they need.
-    let value = serde_json::from_str(&mateval_scene::json::to_text(protocol)).unwrap_or(Value::Null);
+    let value = serde_json::from_str(&mateval_dataset::json::to_text(protocol)).unwrap_or(Value::Null);
     leaves(&value, String::new(), &mut rules);
     rules
 }

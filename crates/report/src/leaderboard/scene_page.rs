@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use std::io::Read as _;
 
 use flate2::read::GzDecoder;
+use mateval_dataset::SceneId;
+use mateval_dataset::layout::INPUT;
 use mateval_eval::result::key::PictureKind;
-use mateval_scene::SceneId;
-use mateval_scene::layout::INPUT;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
@@ -250,7 +250,7 @@ fn viewer() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mateval_scene::manifest::sha256_of_bytes;
+    use mateval_dataset::manifest::sha256_of_bytes;
 
     /// The README beside it states the version and the hash of the viewer, which carries its licence.
     #[test]

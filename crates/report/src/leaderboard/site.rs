@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::SceneError;
 use mateval_image::store::write_whole;
-use mateval_scene::SceneError;
 use minijinja::value::{Serde, Value};
 use minijinja::{AutoEscape, Environment, context};
 use serde::Serialize;

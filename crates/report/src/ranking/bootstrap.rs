@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use mateval_scene::splitmix64;
+use mateval_dataset::splitmix64;
 
 use super::file::{Interval, IntervalKind};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::SceneId;
+use mateval_dataset::SceneId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -10,10 +10,10 @@ mod key_ranking;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_dataset::SceneId;
+use mateval_dataset::submission::Map;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
-use mateval_scene::SceneId;
-use mateval_scene::submission::Map;
 use rayon::prelude::*;
 
 use self::bootstrap::{DrawTable, Draws};
@@ -264,13 +264,13 @@ fn left_out(result: &ResultFile, scores: &ProtocolResult) -> BTreeSet<SceneId> {
 pub(crate) mod tests {
     //! Rankings of simulated leaderboards, whose true means are known.
 
+    use mateval_dataset::open::DatasetId;
+    use mateval_dataset::{Finding, InstanceId, Severity, ViewId, splitmix64};
     use mateval_eval::protocol::Protocol;
     use mateval_eval::result::key::Metric;
     use mateval_eval::result::key::{PictureKind, Region, Views};
     use mateval_eval::result::means::means;
     use mateval_eval::result::{InstanceTexelErrors, PictureValues, RESULT_FORMAT, SubmissionId, TexelErrors};
-    use mateval_scene::open::DatasetId;
-    use mateval_scene::{Finding, InstanceId, Severity, ViewId, splitmix64};
 
     use super::bootstrap::{Clusters, duels, intervals};
     use super::file::{IntervalKind, RankRange, Standing};
@@ -499,7 +499,7 @@ pub(crate) mod tests {
             [result("a", &scores(25.0, 0.3)), result("b", &scores(25.1, -0.2)), result("c", &scores(24.0, 0.5))];
         let text = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            mateval_scene::json::to_text(&pool.install(|| rank(&results, "mateval-3", false)).unwrap())
+            mateval_dataset::json::to_text(&pool.install(|| rank(&results, "mateval-3", false)).unwrap())
         };
         assert_eq!(text(1), text(3));
     }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::{SceneId, SourceKind};
 use mateval_eval::result::key::{Better, Metric};
 use mateval_eval::result::key::{PictureKind, PictureName, ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
 use mateval_metrics::Psnr;
-use mateval_scene::{SceneId, SourceKind};
 
 use super::layouts::{CellKey, Grouping, Layout, Quantity, Value};
 

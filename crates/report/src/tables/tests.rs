@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::open::DatasetId;
-use mateval_scene::{InstanceId, SceneId};
+use mateval_dataset::open::DatasetId;
+use mateval_dataset::{InstanceId, SceneId};
 
 use super::*;
 use mateval_eval::protocol::Protocol;

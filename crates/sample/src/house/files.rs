@@ -200,7 +200,7 @@ pub(super) fn model_info(models: &[Model]) -> String {
     };
     let mut list: Value = models.iter().map(entry).collect();
     list.sort_all_objects();
-    mateval_scene::json::to_text(&list)
+    mateval_dataset::json::to_text(&list)
 }
 
 /// The names of a model's OBJ groups, one for each part.

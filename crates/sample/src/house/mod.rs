@@ -21,8 +21,8 @@ use std::path::Path;
 
 use files::{HOUSE_ID, SampleError, create_folder, number, write_text};
 use layout::House;
+use mateval_dataset::splitmix64;
 use mateval_image::png_io::write_rgb_bytes;
-use mateval_scene::splitmix64;
 use serde_json::{Value, json};
 
 /// The house's licence file: CC0 1.0.
@@ -198,7 +198,7 @@ mod tests {
     use std::path::PathBuf;
 
     use glam::{DMat3, DQuat, DVec3};
-    use mateval_scene::Severity;
+    use mateval_dataset::Severity;
     use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish};
 
     use super::layout::HEIGHT;

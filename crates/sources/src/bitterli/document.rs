@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::findings::shortened;
+use mateval_dataset::source_folder::SourceFolder;
 use mateval_image::limits::{hint, without_mark};
-use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::SourceFolder;
 
 use crate::source_scene::Log;
 
@@ -451,7 +451,7 @@ fn snake_case(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> (Result<Document, BitterliError>, Vec<mateval_scene::Finding>) {
+    fn parse(text: &str) -> (Result<Document, BitterliError>, Vec<mateval_dataset::Finding>) {
         let mut log = Log::new("scene.xml".into(), 100);
         let document = Document::parse_text(text, &mut log);
         (document, log.into_findings())

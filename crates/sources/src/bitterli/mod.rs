@@ -24,10 +24,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::{Camera, Finding};
 use mateval_image::limits::{hint, without_mark};
-use mateval_scene::findings::shortened;
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{Camera, Finding};
 
 use crate::coincident;
 use crate::error::{InvalidSource, SourceError, open};

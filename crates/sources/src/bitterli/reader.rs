@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DMat4, DVec3};
-use mateval_scene::Severity;
-use mateval_scene::findings::shortened;
-use mateval_scene::material::{StatedParameters, TextureIndex};
-use mateval_scene::reference::{LightGroup, MaterialIndex, ReferenceScene};
-use mateval_scene::source_folder::{FileFault, SourceFolder};
+use mateval_dataset::Severity;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::{StatedParameters, TextureIndex};
+use mateval_dataset::reference::{LightGroup, MaterialIndex, ReferenceScene};
+use mateval_dataset::source_folder::{FileFault, SourceFolder};
 
 use super::document::{Element, Ids, Limits, ValueError};
 use crate::source_scene::{Log, UniqueNames};

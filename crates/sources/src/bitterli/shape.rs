@@ -1,12 +1,12 @@
 //! Shapes. Each becomes one surface in world space, and one light if it emits.
 
 use glam::{DMat3, DMat4, DVec3, Vec2};
-use mateval_scene::TriangleMesh;
-use mateval_scene::findings::shortened;
-use mateval_scene::material::StatedParameters;
-use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
-use mateval_scene::source_folder::FileFault;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::StatedParameters;
+use mateval_dataset::obj::{self, Materials, ObjFault, ObjLimits};
+use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
+use mateval_dataset::source_folder::FileFault;
 
 use super::document::Element;
 use super::reader::{Parameters, Reader};

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use mateval_dataset::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
+use mateval_dataset::reference::{Emission, EmissionMap, SurfaceIndex};
+use mateval_dataset::{Severity, obj};
 use mateval_image::Texels;
-use mateval_scene::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
-use mateval_scene::reference::{Emission, EmissionMap, SurfaceIndex};
-use mateval_scene::{Severity, obj};
 use mateval_testkit::shared_data;
 use proptest::prelude::*;
 
@@ -609,7 +609,7 @@ fn real(file: &str) -> Option<BitterliScene> {
 
 /// The triangles of the OBJ files. Rectangles and disks come in addition.
 fn file_triangles(scene: &BitterliScene) -> usize {
-    let of_files = |name: &&mateval_scene::reference::Surface| name.name != "rectangle" && name.name != "disk";
+    let of_files = |name: &&mateval_dataset::reference::Surface| name.name != "rectangle" && name.name != "disk";
     scene.scene.surfaces.iter().filter(of_files).map(|s| s.mesh.triangles.len()).sum()
 }
 

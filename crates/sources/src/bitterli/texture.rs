@@ -1,11 +1,11 @@
 //! Colour and number parameters: constants, or bitmaps read from files.
 
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
+use mateval_dataset::reference::SourceTexture;
+use mateval_dataset::source_folder::FileFault;
 use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::findings::shortened;
-use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
-use mateval_scene::reference::SourceTexture;
-use mateval_scene::source_folder::FileFault;
 
 use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;

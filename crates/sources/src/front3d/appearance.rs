@@ -2,17 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::Severity;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::MaterialClass;
+use mateval_dataset::material::{
+    ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
+};
+use mateval_dataset::reference::{MaterialIndex, SourceTexture};
+use mateval_dataset::source_folder::FileFault;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::Severity;
-use mateval_scene::findings::shortened;
-use mateval_scene::material::MaterialClass;
-use mateval_scene::material::{
-    ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
-};
-use mateval_scene::reference::{MaterialIndex, SourceTexture};
-use mateval_scene::source_folder::FileFault;
 
 use super::house::{House, HouseMaterial};
 use super::material_class::{AppearanceRule, BLOCK, Finish, drawn};

@@ -7,9 +7,9 @@
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
-use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{TriangleMesh, mesh};
+use mateval_dataset::camera::{Camera, Intrinsics};
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::{TriangleMesh, mesh};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 

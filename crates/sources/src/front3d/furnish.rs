@@ -7,11 +7,11 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3};
-use mateval_scene::findings::shortened;
-use mateval_scene::material::StatedParameters;
-use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::source_folder::{LookedFor, SourceFolder};
-use mateval_scene::{Finding, Role, Severity, TriangleMesh};
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::StatedParameters;
+use mateval_dataset::reference::{ReferenceScene, Surface};
+use mateval_dataset::source_folder::{LookedFor, SourceFolder};
+use mateval_dataset::{Finding, Role, Severity, TriangleMesh};
 
 use super::appearance::{Appearances, MISSING};
 use super::document::Limits;

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use mateval_scene::findings::shortened;
-use mateval_scene::material::UvTransform;
-use mateval_scene::{Severity, TriangleMesh};
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::UvTransform;
+use mateval_dataset::{Severity, TriangleMesh};
 use serde_json::Value;
 
 use super::document::{HouseError, Limits, kind, list, number, numbers, parse, text};

@@ -1,8 +1,8 @@
 //! Meshes of the architecture: turns flat lists of numbers into triangles and reports what had to be repaired.
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_scene::TriangleMesh;
-use mateval_scene::findings::shortened;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::findings::shortened;
 use serde_json::Value;
 
 use super::document::{kind, list, number};

@@ -13,10 +13,10 @@
 use std::collections::BTreeMap;
 
 use glam::Vec2;
-use mateval_scene::TriangleMesh;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::material::MaterialClass;
-use mateval_scene::material::UvTransform;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::material::MaterialClass;
+use mateval_dataset::material::UvTransform;
 
 /// How the roughness and metallic of a house are chosen, since the data states neither.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

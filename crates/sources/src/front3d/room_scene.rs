@@ -4,12 +4,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_scene::ids::id_text_from;
-use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
-use mateval_scene::reference::{
+use mateval_dataset::ids::id_text_from;
+use mateval_dataset::material::{ColorInput, MaterialModel, TextureIndex};
+use mateval_dataset::reference::{
     Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex,
 };
-use mateval_scene::{Camera, Role, SceneLights, SourceKind};
+use mateval_dataset::{Camera, Role, SceneLights, SourceKind};
 use mateval_tracer::World;
 use mateval_tracer::aov::{coarse_subpixels, hit_through};
 use rayon::prelude::*;

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use glam::{DVec3, Vec3};
-use mateval_scene::reference::Surface;
-use mateval_scene::{Role, Severity, TriangleMesh};
+use mateval_dataset::reference::Surface;
+use mateval_dataset::{Role, Severity, TriangleMesh};
 use serde_json::{Value, json};
 
 use super::*;
@@ -95,7 +95,7 @@ fn jid(number: u32) -> String {
 }
 
 /// A house read from JSON alone, and the findings.
-fn read_house(json: &Value) -> (Result<House, HouseError>, Vec<mateval_scene::Finding>) {
+fn read_house(json: &Value) -> (Result<House, HouseError>, Vec<mateval_dataset::Finding>) {
     let mut log = crate::source_scene::Log::new("house.json".into(), 5_000);
     let house = house::read(json, "stem", &Limits::default(), &mut log);
     (house, log.into_findings())

@@ -3,15 +3,15 @@
 //! alpha modes, emission.
 
 use gltf::material::{AlphaMode, PbrSpecularGlossiness};
-use mateval_image::texture_io::Encoding;
-use mateval_image::{Texels, Texture};
-use mateval_scene::findings::shortened;
-use mateval_scene::material::{
+use mateval_dataset::findings::shortened;
+use mateval_dataset::material::{
     ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, StatedParameters,
     TextureIndex,
 };
-use mateval_scene::reference::{EmissionMap, MaterialIndex, SourceTexture};
-use mateval_scene::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
+use mateval_dataset::reference::{EmissionMap, MaterialIndex, SourceTexture};
+use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
+use mateval_image::texture_io::Encoding;
+use mateval_image::{Texels, Texture};
 
 use super::reader::{Glow, LEFT_OUT, Omission, ReadMaterial, Reader};
 use super::textures::{Lookup, wraps};

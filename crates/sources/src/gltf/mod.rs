@@ -22,8 +22,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DVec3;
-use mateval_scene::reference::{Emission, LightGroup, ReferenceScene};
-use mateval_scene::{Camera, Finding, SceneLights};
+use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene};
+use mateval_dataset::{Camera, Finding, SceneLights};
 
 use crate::error::{InvalidSource, SourceError, open};
 use crate::source_scene::{InstanceOrigin, LicenceText, Log, UniqueNames, read_licence, report_shift, shift_of};

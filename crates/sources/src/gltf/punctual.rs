@@ -8,10 +8,10 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3};
 use gltf::khr_lights_punctual::{Kind, Light};
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, TextureIndex};
+use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, SourceTexture, Surface, SurfaceIndex};
+use mateval_dataset::{Role, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, TextureIndex};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, SourceTexture, Surface, SurfaceIndex};
-use mateval_scene::{Role, TriangleMesh};
 
 use super::reader::{LEFT_OUT, Omission, Reader};
 use crate::primitives::{MapDisc, ROWS, disk, sphere};

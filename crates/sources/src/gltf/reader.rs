@@ -3,11 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_scene::findings::shortened;
-use mateval_scene::gltf_file::GltfFile;
-use mateval_scene::material::{StatedParameters, TextureIndex};
-use mateval_scene::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene};
-use mateval_scene::source_folder::SourceFolder;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::gltf_file::GltfFile;
+use mateval_dataset::material::{StatedParameters, TextureIndex};
+use mateval_dataset::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene};
+use mateval_dataset::source_folder::SourceFolder;
 
 use super::document::Limits;
 use crate::source_scene::{InstanceOrigin, Log, UniqueNames};

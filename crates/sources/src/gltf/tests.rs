@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
+use mateval_dataset::Severity;
+use mateval_dataset::material::{ColorInput, MaterialModel, ScalarInput};
 use mateval_image::{Picture, png_io};
-use mateval_scene::Severity;
-use mateval_scene::material::{ColorInput, MaterialModel, ScalarInput};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -258,7 +258,7 @@ fn surfaces_that_emit() {
     });
     let scene = read_json(&with("/materials/0", material));
     let expected = Emission::Area {
-        surfaces: vec![mateval_scene::reference::SurfaceIndex(0)],
+        surfaces: vec![mateval_dataset::reference::SurfaceIndex(0)],
         radiance: [8.0, 4.0, 0.0],
         map: None,
         two_sided: true,

@@ -3,16 +3,16 @@
 
 use std::path::Path;
 
+use mateval_dataset::Severity;
+use mateval_dataset::findings::shortened;
+use mateval_dataset::gltf_file::view_bytes;
+use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_dataset::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
+use mateval_dataset::reference::SourceTexture;
+use mateval_dataset::source_folder::FileFault;
 use mateval_image::limits::hint;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use mateval_image::{ImageError, Texels, Texture, Wrap};
-use mateval_scene::Severity;
-use mateval_scene::findings::shortened;
-use mateval_scene::gltf_file::view_bytes;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
-use mateval_scene::reference::SourceTexture;
-use mateval_scene::source_folder::FileFault;
 
 use super::document::read_uri;
 use super::reader::{Aspect, Omission, Reader};
@@ -278,7 +278,7 @@ mod tests {
             r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"a"}}],"textures":[{{"source":0}}],"materials":[
             {{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{transform}}}}}}}}}]}}"#
         );
-        let file = mateval_scene::gltf_file::parse(text.as_bytes()).unwrap().document;
+        let file = mateval_dataset::gltf_file::parse(text.as_bytes()).unwrap().document;
         let info = file.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
         Lookup::new(&info).uv
     }

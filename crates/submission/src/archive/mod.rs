@@ -12,8 +12,8 @@ use std::borrow::Cow;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::submission::SUBMISSION;
 use mateval_image::limits::hint;
-use mateval_scene::submission::SUBMISSION;
 
 use crate::error::SubmissionError;
 pub use tar_gz::unpack_tar_gz;

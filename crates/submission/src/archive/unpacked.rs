@@ -3,8 +3,8 @@
 use std::io::{ErrorKind, Read, Write as _};
 use std::path::Path;
 
-use mateval_scene::Finding;
-use mateval_scene::findings::shortened;
+use mateval_dataset::Finding;
+use mateval_dataset::findings::shortened;
 
 use crate::error::error;
 use crate::map_file::MAX_MAP_BYTES;

@@ -1,9 +1,9 @@
 //! Base colours compared with the input picture: turned atlases, exchanged channels, numbers that were encoded or
 //! decoded once too often, light and shadow baked in.
 
+use mateval_dataset::Finding;
 use mateval_image::LinearRgb;
 use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
-use mateval_scene::Finding;
 
 use super::sight::{Look, Pairs, Turn};
 use crate::error::warning;
@@ -361,7 +361,7 @@ pub(super) fn shading_baked_in(place: &str, looks: &[Look]) -> Option<Finding> {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::splitmix64::number;
+    use mateval_dataset::splitmix64::number;
 
     use super::Decoding::{Right, Unknown, Wrong};
     use super::*;

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::findings::shortened;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::{Map, SUBMISSION};
-use mateval_scene::{Finding, SceneId};
+use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::findings::shortened;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::{Map, SUBMISSION};
+use mateval_dataset::{Finding, SceneId};
 
 use crate::archive::MAX_ENTRIES;
 use crate::error::{SubmissionError, error, note, warning};

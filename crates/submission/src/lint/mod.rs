@@ -23,9 +23,9 @@ pub mod submission_json;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mateval_scene::open::Dataset;
-use mateval_scene::open::DatasetId;
-use mateval_scene::{Finding, Progress, Report, Severity};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::open::DatasetId;
+use mateval_dataset::{Finding, Progress, Report, Severity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -5,13 +5,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::submission::Map;
+use mateval_dataset::{Finding, InstanceId, SceneError, Severity};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Texture, Wrap};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::SceneFolder;
-use mateval_scene::open::Dataset;
-use mateval_scene::submission::Map;
-use mateval_scene::{Finding, InstanceId, SceneError, Severity};
 use rayon::prelude::*;
 
 use super::base_colours::{self, Decoding, Readings};

@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec2;
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::reference::SurfaceIndex;
+use mateval_dataset::{Camera, TriangleMesh, reference};
 use mateval_image::{LinearRgb, Mask, Picture, Texture, exr_io, png_io};
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::open::Dataset;
-use mateval_scene::reference::SurfaceIndex;
-use mateval_scene::{Camera, TriangleMesh, reference};
 use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
+use mateval_dataset::findings::shortened;
+use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
+use mateval_dataset::{Finding, Severity};
 use mateval_image::limits::{hint, without_mark};
-use mateval_scene::findings::shortened;
-use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_scene::{Finding, Severity};
 use serde_json::{Map, Value};
 
 use super::folder::nearest;
@@ -215,9 +215,9 @@ fn is_unprintable(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mateval_scene::dataset::{Perturbation, PerturbationKind};
-    use mateval_scene::submission::Cost;
-    use mateval_scene::submission::StoredEncoding;
+    use mateval_dataset::dataset::{Perturbation, PerturbationKind};
+    use mateval_dataset::submission::Cost;
+    use mateval_dataset::submission::StoredEncoding;
     use serde_json::json;
 
     /// The codes of what is found in a folder with this `submission.json`.
@@ -249,7 +249,7 @@ mod tests {
             url: Some("https://example.org".to_owned()),
             licence: Some("MIT".to_owned()),
             cost: Some(Cost { seconds_a_scene: 1.5, hardware: "a laptop".to_owned() }),
-            assumed_encodings: [(mateval_scene::submission::Map::Roughness, StoredEncoding::Linear)].into(),
+            assumed_encodings: [(mateval_dataset::submission::Map::Roughness, StoredEncoding::Linear)].into(),
             geometry: Some(Perturbation { kind: PerturbationKind::Pose, level: 1 }),
             dataset_manifest_sha256: "0".repeat(64),
         };

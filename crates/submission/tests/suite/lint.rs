@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use exr::prelude as ex;
 use exr::prelude::traits::*;
+use mateval_dataset::Severity;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::Severity;
 use mateval_submission::lint::{LintFile, LintPlan, lint};
 use mateval_testkit::sample_dataset::{dataset, write_from_photo, write_grey, write_nearest, write_truth};
 
@@ -131,7 +131,7 @@ fn baselines_are_not_accused() {
 fn a_public_dataset_is_enough() {
     let (folder, public) = (good(), tempfile::tempdir().unwrap());
     copy_public(&dataset().root, public.path());
-    let opened = mateval_scene::open::Dataset::open(public.path()).unwrap();
+    let opened = mateval_dataset::open::Dataset::open(public.path()).unwrap();
     let submission = folder.path().join("gt");
     let look =
         |submission: &Path| lint(&LintPlan { dataset: &opened, submission, tool: "test".to_owned() }, &|_| ()).unwrap();

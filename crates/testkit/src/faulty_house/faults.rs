@@ -266,7 +266,7 @@ fn damaged_text(name: &str, text: &str) -> String {
         "model_not_listed" => {
             let mut list: Vec<Value> = serde_json::from_str(text).unwrap();
             list.retain(|entry| entry["model_id"] != "cc0f0000-5a3b-4e00-8000-000000000021");
-            mateval_scene::json::to_text(&list)
+            mateval_dataset::json::to_text(&list)
         }
         "mtl_misleads" => {
             let black = text.replace("Ka 0.588 0.588 0.588", "Ka 0 0 0").replace("Kd 0.588 0.588 0.588", "Kd 0 0 0");

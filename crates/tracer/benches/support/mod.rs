@@ -4,9 +4,9 @@
 
 use cpu_time::ProcessTime;
 use glam::{DVec3, Vec2, Vec3};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
 
 /// A closed room of 6 x 5 x 3 m (z up) with bumpy spheres on its floor: about `triangles` triangles, one mesh per
 /// sphere.

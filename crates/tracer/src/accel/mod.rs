@@ -9,8 +9,8 @@ mod traverse;
 mod wide;
 
 use glam::Vec3;
-use mateval_scene::TriangleMesh;
-use mateval_scene::reference::SurfaceIndex;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::reference::SurfaceIndex;
 
 use crate::error::{ExceededLimit, RequestFault, SceneFault, SurfaceFault, TracerError};
 use crate::ray::{Hit, Ray, TriangleIndex};

@@ -14,7 +14,7 @@ use std::array::from_fn;
 use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
-use mateval_scene::material::Distribution;
+use mateval_dataset::material::Distribution;
 
 use super::facets::{Facets, fresnel_dielectric, reflect};
 

@@ -8,7 +8,7 @@
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
-use mateval_scene::material::{ConductorIor, Distribution};
+use mateval_dataset::material::{ConductorIor, Distribution};
 
 use crate::sampling;
 

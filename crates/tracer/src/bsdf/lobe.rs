@@ -3,8 +3,8 @@
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use glam::{Vec2, Vec3};
+use mateval_dataset::material::{ColorInput, ConductorIor, Material, MaterialModel, Microfacets};
 use mateval_image::Texture;
-use mateval_scene::material::{ColorInput, ConductorIor, Material, MaterialModel, Microfacets};
 
 use super::albedo_tables::{RoughCoat, Table};
 use super::facets::{

@@ -13,9 +13,9 @@ mod tables;
 mod tests;
 
 use glam::{Vec2, Vec3};
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::material::{BumpMap, Material, ScalarInput};
 use mateval_image::Texture;
-use mateval_scene::TriangleMesh;
-use mateval_scene::material::{BumpMap, Material, ScalarInput};
 
 use crate::ray::SurfaceHit;
 use crate::sampling::Frame;

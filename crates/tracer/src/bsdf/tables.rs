@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use mateval_image::Texture;
-use mateval_scene::material::{
+use mateval_dataset::material::{
     ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
 };
-use mateval_scene::reference::{MaterialIndex, ReferenceScene};
+use mateval_dataset::reference::{MaterialIndex, ReferenceScene};
+use mateval_image::Texture;
 
 use super::albedo_tables::{BlenderTables, RoughCoat, Table, Widths};
 use super::facets::{diffuse_reflectance, eta_from_specular};
@@ -168,7 +168,7 @@ impl ReflectanceMeter {
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::material::{ConductorIor, TextureIndex};
+    use mateval_dataset::material::{ConductorIor, TextureIndex};
 
     use super::*;
 

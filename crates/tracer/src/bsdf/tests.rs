@@ -4,11 +4,11 @@
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
-use mateval_image::{Texels, Wrap};
-use mateval_scene::material::{
+use mateval_dataset::material::{
     ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, TextureIndex, UvTransform,
 };
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_image::{Texels, Wrap};
 use rayon::prelude::*;
 
 use super::facets::LocalSample;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::material::UvTransform;
+use mateval_dataset::reference::{EmissionMap, LightIndex, ReferenceScene, SurfaceIndex};
 use mateval_image::{Texels, Texture};
-use mateval_scene::TriangleMesh;
-use mateval_scene::material::UvTransform;
-use mateval_scene::reference::{EmissionMap, LightIndex, ReferenceScene, SurfaceIndex};
 
 use crate::error::LightFault;
 use crate::ray::{SurfaceHit, TriangleIndex, TriangleRecord};

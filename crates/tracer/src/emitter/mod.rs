@@ -13,9 +13,9 @@ pub mod group_shares;
 use std::sync::Arc;
 
 use glam::Vec3;
+use mateval_dataset::TriangleMesh;
+use mateval_dataset::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
 use mateval_image::Texture;
-use mateval_scene::TriangleMesh;
-use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
 
 use crate::accel::Accel;
 use crate::error::{LightFault, RequestFault, SceneFault, TracerError};
@@ -498,7 +498,7 @@ pub(crate) fn escape_share(emitters: &Emitters, first_opaque: impl Fn(&SurfaceHi
 
 #[cfg(test)]
 mod tests {
-    use mateval_scene::reference::{LightGroup, MaterialIndex, Surface};
+    use mateval_dataset::reference::{LightGroup, MaterialIndex, Surface};
 
     use super::*;
 

@@ -12,9 +12,9 @@ use std::array::from_fn;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3, Vec3};
+use mateval_dataset::Camera;
+use mateval_dataset::reference::LightIndex;
 use mateval_image::Picture;
-use mateval_scene::Camera;
-use mateval_scene::reference::LightIndex;
 use rayon::prelude::*;
 
 use crate::error::{RequestFault, TracerError};

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use glam::{DMat3, DVec2, DVec3};
-use mateval_scene::{Camera, Intrinsics};
+use mateval_dataset::{Camera, Intrinsics};
 
 use crate::sampling::Sampler;
 

@@ -6,12 +6,12 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
-use mateval_scene::material::{
+use mateval_dataset::material::{
     ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
 };
-use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture, SurfaceIndex};
-use mateval_scene::{Camera, TriangleMesh};
+use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture, SurfaceIndex};
+use mateval_dataset::{Camera, TriangleMesh};
+use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use mateval_testkit::statistics::{Renders, chi_square_z};
 use mateval_tracer::accel::{Accel, InstructionSet};

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
+use mateval_dataset::material::{ColorInput, ConductorIor, Material, MaterialModel, ScalarInput, TextureIndex};
+use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture};
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap, png_io};
-use mateval_scene::material::{ColorInput, ConductorIor, Material, MaterialModel, ScalarInput, TextureIndex};
-use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture};
-use mateval_scene::{Camera, TriangleMesh};
 use mateval_testkit::bench_scene;
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use mateval_testkit::statistics::{Estimate, Renders};

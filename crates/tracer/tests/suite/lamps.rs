@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use mateval_dataset::material::{ColorInput, ConductorIor, MaterialModel, TextureIndex, UvTransform};
+use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture};
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
-use mateval_scene::material::{ColorInput, ConductorIor, MaterialModel, TextureIndex, UvTransform};
-use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture};
-use mateval_scene::{Camera, TriangleMesh};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use mateval_testkit::statistics::Renders;
 use mateval_tracer::{LightBasis, LightGroups, LightSampling, RenderSettings, Sampler, World, render, render_views};

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use mateval_dataset::material::{ColorInput, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_dataset::reference::{Emission, ReferenceScene};
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::material::{ColorInput, MaterialModel, PrincipledFlavour, ScalarInput};
-use mateval_scene::reference::{Emission, ReferenceScene};
-use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Coat, LightGroups, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World};
 use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_views};
 

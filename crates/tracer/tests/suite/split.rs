@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use glam::DVec2;
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SurfaceIndex};
+use mateval_dataset::{Camera, Intrinsics};
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SurfaceIndex};
-use mateval_scene::{Camera, Intrinsics};
 use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::aov::hit_through;
 use mateval_tracer::error::{RequestFault, TracerError};

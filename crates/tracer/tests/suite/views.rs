@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3};
+use mateval_dataset::material::{ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, ScalarInput};
+use mateval_dataset::reference::{Emission, LightIndex, ReferenceScene};
+use mateval_dataset::{Camera, Intrinsics};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::material::{ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, ScalarInput};
-use mateval_scene::reference::{Emission, LightIndex, ReferenceScene};
-use mateval_scene::{Camera, Intrinsics};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use mateval_testkit::statistics::Renders;
 use mateval_tracer::shared_centre::{groups_with_one_centre, noise_blocks};

@@ -254,7 +254,7 @@ fn every_fault_is_reported_and_nothing_else() {
     let mut reported = BTreeSet::new();
     for fault in &FAULTS {
         let Some([code, file, place]) = wanted(fault) else { continue };
-        let is_it = |(_, finding): &(usize, &mateval_scene::Finding)| {
+        let is_it = |(_, finding): &(usize, &mateval_dataset::Finding)| {
             finding.code == code && finding.file.ends_with(&file) && finding.place == place
         };
         let found: Vec<usize> = house.findings.iter().enumerate().filter(is_it).map(|(at, _)| at).collect();

@@ -1,8 +1,8 @@
 //! Models: faulty OBJ files, ids that are paths, the parts of a sound model, and roughness and metallic by what the
 //! data states of models, their groups, and architecture.
 
-use mateval_scene::material::MaterialClass;
-use mateval_scene::material::{Material, MaterialModel, ScalarInput};
+use mateval_dataset::material::MaterialClass;
+use mateval_dataset::material::{Material, MaterialModel, ScalarInput};
 
 use super::*;
 

@@ -1,8 +1,8 @@
 //! Pieces, their models and materials, and their placement: `T * R * S`, and BlenderProc's mirrored world.
 
 use glam::{DMat3, DMat4, DQuat};
-use mateval_scene::material::{ColorInput, Material, MaterialModel, UvTransform};
-use mateval_scene::source_folder::SourceFolder;
+use mateval_dataset::material::{ColorInput, Material, MaterialModel, UvTransform};
+use mateval_dataset::source_folder::SourceFolder;
 
 use super::*;
 use crate::source_scene::Log;

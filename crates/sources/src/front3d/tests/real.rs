@@ -1,7 +1,7 @@
 //! Tests on two real houses from the shared data.
 
-use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::material::{ColorInput, MaterialModel};
+use mateval_dataset::camera::{Camera, Intrinsics};
+use mateval_dataset::material::{ColorInput, MaterialModel};
 use mateval_testkit::shared_data;
 use mateval_tracer::World;
 

@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
-use mateval_scene::Camera;
-use mateval_scene::camera::Intrinsics;
-use mateval_scene::ids::id_text_from;
-use mateval_scene::material::{ColorInput, MaterialModel};
-use mateval_scene::reference::Emission;
+use mateval_dataset::Camera;
+use mateval_dataset::camera::Intrinsics;
+use mateval_dataset::ids::id_text_from;
+use mateval_dataset::material::{ColorInput, MaterialModel};
+use mateval_dataset::reference::Emission;
 use mateval_tracer::{Ray, RenderSettings, World, render};
 
 use super::*;
