@@ -22,7 +22,7 @@ use crate::map_file::{self, MAX_MAP_BYTES, MapFile, default_value};
 pub const MAX_SCENE_BYTES: usize = 8 << 30;
 
 /// One instance's maps. A map with the same value everywhere has one texel.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PredictedMaterial {
     /// Linear at lookup.
     pub base_color: Texture,

@@ -41,7 +41,8 @@ pub(crate) fn score_fitted(
     // A batch holds a render and four quarters of every prediction under two fits, or two bases of the input view.
     let pictures = (5 * 2 * task.views.len()).max(4 * lit.names.len()) as u64;
     let bytes = pictures * task.pixels() * size_of::<LinearRgb>() as u64;
-    for batch in batches(task.predictions, 0, bytes) {
+    let all: Vec<usize> = (0..task.predictions.len()).collect();
+    for batch in batches(task.predictions, &all, 0, bytes) {
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
         let repaint = paths.repaint(&predictions, None)?;
         let fits = lit.fit(&paths, &repaint, task, truths, &photos)?;

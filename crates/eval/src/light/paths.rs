@@ -118,12 +118,12 @@ impl Paths<'_> {
     }
 }
 
-/// Predictions that share paths, by their numbers: those that agree in roughness and metallic, as many as the tracer
-/// takes at once beside `others` more and as fit in memory, where each takes `bytes`.
-pub(crate) fn batches(predictions: &[PredictedScene], others: usize, bytes: u64) -> Vec<Vec<usize>> {
+/// Groups `predictions` (numbers of `all`) that share paths: those that agree in roughness and metallic, as many as the
+/// tracer takes at once beside `others` more and as fit in memory, where each takes `bytes`.
+pub(crate) fn batches(all: &[PredictedScene], predictions: &[usize], others: usize, bytes: u64) -> Vec<Vec<usize>> {
     let mut alike: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-    for (index, prediction) in predictions.iter().enumerate() {
-        alike.entry(&prediction.scattering_key).or_default().push(index);
+    for &index in predictions {
+        alike.entry(&all[index].scattering_key).or_default().push(index);
     }
     let at_once = mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE - others;
     let in_memory = (BATCH_BYTES / bytes.max(1)).saturating_sub(others as u64);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, ViewGuide, corrected_quarter, difference};
 use crate::light::lighting::{LightingName, group_shares, light_of, lightings};
-use crate::light::paths::{Paths, ViewQuarters, batches, picture_of};
+use crate::light::paths::{Paths, QUARTERS, ViewQuarters, batches, picture_of};
 use crate::light::reference::{StoredReference, weighted};
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
@@ -80,7 +80,28 @@ pub(super) fn score_own(
     let samples = rules.samples.each_half(task.pixels());
     // A batch holds a render and four quarters of every prediction.
     let bytes = 5 * (lightings.len() as u64) * task.pixels_of_all_views() * size_of::<LinearRgb>() as u64;
-    for batch in batches(task.predictions, 1, bytes) {
+    let mut compare = |index, ratios: &[_], lighting: &OwnLighting, quarters: ViewQuarters, not_finite| {
+        let guides = Guides { truths, ratios, references: &lighting.references };
+        if let Some(kept) = task.pictures {
+            for (at, (view, quarters)) in task.views.iter().zip(&quarters).enumerate() {
+                kept.keep_light(index, (&scene, &view.id), lighting.name, quarters, &guides.of(at))?;
+            }
+        }
+        let OwnLighting { track, name, encoded, .. } = lighting;
+        let (track, lighting, views) = (*track, *name, guides.differences(quarters));
+        each(index, LitPicture { track, lighting, references: encoded, views, of_fits: None, fit: None, not_finite })
+    };
+    // Where a prediction is the truth texel by texel, every m is R (see `difference`), so no path is traced.
+    let is_truth = |&index: &usize| task.predictions[index].materials == truth.materials;
+    let (exact, others): (Vec<usize>, Vec<usize>) = (0..task.predictions.len()).partition(is_truth);
+    for index in exact {
+        let ratios = base_colors.ratios(index);
+        for lighting in &lightings {
+            let quarters = lighting.references.iter().map(|reference| vec![reference.clone(); QUARTERS.len()]);
+            compare(index, &ratios, lighting, quarters.collect(), 0)?;
+        }
+    }
+    for batch in batches(task.predictions, &others, 1, bytes) {
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
         let repaint = paths.repaint(&predictions, Some(&truth))?;
         let mixes = vec![mixes.clone(); repaint.predictions()];
@@ -95,23 +116,9 @@ pub(super) fn score_own(
             paths.quarters(&repaint, &mixes, &cameras, batch.len(), samples, corrected)?;
         for (at, &index) in batch.iter().enumerate() {
             for (picture, lighting) in lightings.iter().enumerate() {
-                let quarters = std::mem::take(&mut quarters[at][picture]);
-                let guides = Guides { truths, ratios: &ratios[at], references: &lighting.references };
-                if let Some(kept) = task.pictures {
-                    for (at, (view, quarters)) in task.views.iter().zip(&quarters).enumerate() {
-                        let place = (&task.scene.id, &view.id);
-                        kept.keep_light(index, place, lighting.name, quarters, &guides.of(at))?;
-                    }
-                }
-                let (track, name) = (lighting.track, lighting.name);
-                let views = guides.differences(quarters);
-                let references = &lighting.encoded;
                 // The scene's count, once.
                 let not_finite = std::mem::take(&mut not_finite[at]);
-                each(
-                    index,
-                    LitPicture { track, lighting: name, references, views, of_fits: None, fit: None, not_finite },
-                )?;
+                compare(index, &ratios[at], lighting, std::mem::take(&mut quarters[at][picture]), not_finite)?;
             }
         }
     }
