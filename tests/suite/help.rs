@@ -122,3 +122,12 @@ fn every_subcommand_has_help() {
     }
     run(mateval().arg("no-such-thing")).ends_with(2).says("unrecognized subcommand 'no-such-thing'");
 }
+
+#[test]
+fn completions_name_the_commands() {
+    for (shell, start) in [("bash", "_mateval()"), ("zsh", "#compdef mateval"), ("fish", "# Print an optspec")] {
+        let found = run(mateval().args(["completions", shell]));
+        assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+        assert!(found.stdout.starts_with(start) && found.stdout.contains("leaderboard"), "{}", found.stdout);
+    }
+}

@@ -32,7 +32,7 @@ fn every_path_on_the_map_exists() {
 /// The twin.
 #[test]
 fn a_missing_path_is_found() {
-    let text = "| a metric | `metrics/src/`, `metrics/src/nowhere.rs`, `cargo run -- schema` |";
+    let text = "| a metric | `metrics/src/`, `metrics/src/nowhere.rs`, `cargo run -- demo` |";
     assert_eq!(missing(&named_paths(text)), ["metrics/src/nowhere.rs"]);
 }
 

@@ -1,15 +1,33 @@
 //! Checks the documents against the program: the schemas, examples and worked numbers of `dataset_spec/`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::dataset::SceneFile;
+use mateval_audit::compare::file::CompareFile;
+use mateval_audit::stats::StatsFile;
+use mateval_baselines::encoding_report::EncodingReport;
+use mateval_baselines::import::{FlatMaterials, ImportReport};
+use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
+use mateval_dataset::material::MaterialClassesFile;
+use mateval_dataset::reference::{LightsFile, ReferenceFile, SourceMaterialsFile};
+use mateval_dataset::render_file::RenderFile;
+use mateval_dataset::render_file::ScorerFile;
+use mateval_dataset::submission::SubmissionFile;
+use mateval_dataset::render_file;
+use mateval_eval::result::ResultFile;
+use mateval_eval::verify::VerificationFile;
+use mateval_prep::blender::{BlenderJob, BlenderResult};
+use mateval_prep::survey::SurveyFile;
+use mateval_release::ReleaseFile;
+use mateval_report::explain::file::ExplainFile;
+use mateval_report::leaderboard::entries::ErrataFile;
+use mateval_report::leaderboard::file::LeaderboardFile;
+use mateval_submission::lint::LintFile;
+use schemars::{Schema, schema_for};
 use serde_json::Value;
 
-use super::command::run_words;
-
 /// The command that updates the schemas.
-const FIX: &str = "cargo run -- schema dataset_spec/schema --force";
+const FIX: &str = "MATEVAL_WRITE_SCHEMAS=1 cargo test --test suite schemas_are_those_of_the_types";
 
 fn spec(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("dataset_spec").join(path)
@@ -21,48 +39,75 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap())).collect()
 }
 
-/// A line for every file whose bytes differ between the folders.
-fn differences(made: &Path, kept: &Path) -> Vec<String> {
-    let (made, kept) = (files(made), files(kept));
-    let names: std::collections::BTreeSet<&String> = made.keys().chain(kept.keys()).collect();
-    names.into_iter().filter(|name| made.get(*name) != kept.get(*name)).map(|n| format!("{n}; run: {FIX}")).collect()
+/// The JSON Schema of every kind of JSON file, made from the Rust type that reads and writes it.
+fn schemas() -> [(&'static str, Schema); 26] {
+    [
+        ("dataset", schema_for!(DatasetFile)),
+        ("targets", schema_for!(TargetsFile)),
+        ("scene", schema_for!(SceneFile)),
+        ("reference", schema_for!(ReferenceFile)),
+        ("source_materials", schema_for!(SourceMaterialsFile)),
+        ("lights", schema_for!(LightsFile)),
+        ("material_classes", schema_for!(MaterialClassesFile)),
+        ("render", schema_for!(RenderFile)),
+        ("submission", schema_for!(SubmissionFile)),
+        ("scorer", schema_for!(ScorerFile)),
+        ("result", schema_for!(ResultFile)),
+        ("explain", schema_for!(ExplainFile)),
+        ("verification", schema_for!(VerificationFile)),
+        ("lint", schema_for!(LintFile)),
+        ("leaderboard", schema_for!(LeaderboardFile)),
+        ("errata", schema_for!(ErrataFile)),
+        ("stats", schema_for!(StatsFile)),
+        ("release", schema_for!(ReleaseFile)),
+        ("survey", schema_for!(SurveyFile)),
+        ("blender_job", schema_for!(BlenderJob)),
+        ("blender_result", schema_for!(BlenderResult)),
+        ("compare", schema_for!(CompareFile)),
+        ("compare_verdict", schema_for!(render_file::CompareFile)),
+        ("encoding", schema_for!(EncodingReport)),
+        ("import", schema_for!(ImportReport)),
+        ("import_materials", schema_for!(FlatMaterials)),
+    ]
 }
 
-fn write_schemas(folder: &Path) {
-    run_words(["schema".as_ref(), folder.as_os_str()]).ends_with(0);
+/// The schemas as files, by name.
+fn made() -> BTreeMap<String, Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, schema) in schemas() {
+        mateval_dataset::json::write(&folder.path().join(format!("{name}.schema.json")), &schema).unwrap();
+    }
+    files(folder.path())
+}
+
+/// A line for every file whose bytes differ.
+fn differences(made: &BTreeMap<String, Vec<u8>>, kept: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
+    let names: BTreeSet<&String> = made.keys().chain(kept.keys()).collect();
+    names.into_iter().filter(|name| made.get(*name) != kept.get(*name)).map(|n| format!("{n}; run: {FIX}")).collect()
 }
 
 #[test]
 fn schemas_are_those_of_the_types() {
-    let made = tempfile::tempdir().unwrap();
-    write_schemas(made.path());
-    assert_eq!(files(made.path()).len(), 26);
-    assert_eq!(differences(made.path(), &spec("schema")), Vec::<String>::new());
+    let (made, folder) = (made(), spec("schema"));
+    if std::env::var_os("MATEVAL_WRITE_SCHEMAS").is_some() {
+        for (name, bytes) in &made {
+            std::fs::write(folder.join(name), bytes).unwrap();
+        }
+    }
+    assert_eq!(differences(&made, &files(&folder)), Vec::<String>::new());
 }
 
 /// The twin: a changed, a missing and an additional file are each found.
 #[test]
 fn a_changed_schema_is_found() {
-    let (made, kept) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    write_schemas(made.path());
-    write_schemas(kept.path());
-    let changed = kept.path().join("scene.schema.json");
-    let text = std::fs::read_to_string(&changed).unwrap();
-    std::fs::write(&changed, text.replace("world_from_camera", "camera_from_world")).unwrap();
-    std::fs::remove_file(kept.path().join("lights.schema.json")).unwrap();
-    std::fs::write(kept.path().join("old.schema.json"), "{}").unwrap();
+    let made = made();
+    let mut kept = made.clone();
+    let text = String::from_utf8(kept["scene.schema.json"].clone()).unwrap();
+    kept.insert("scene.schema.json".into(), text.replace("world_from_camera", "camera_from_world").into_bytes());
+    kept.remove("lights.schema.json");
+    kept.insert("old.schema.json".into(), b"{}".to_vec());
     let expected = ["lights", "old", "scene"].map(|name| format!("{name}.schema.json; run: {FIX}"));
-    assert_eq!(differences(made.path(), kept.path()), expected);
-}
-
-#[test]
-fn nothing_is_overwritten_without_force() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.schema.json"), "mine").unwrap();
-    run_words(["schema".as_ref(), folder.path().as_os_str()]).ends_with(2).says("add --force to overwrite it");
-    assert_eq!(files(folder.path()).len(), 1);
-    run_words(["schema".as_ref(), folder.path().as_os_str(), "--force".as_ref()]).ends_with(0);
-    assert_eq!(files(folder.path()).len(), 26);
+    assert_eq!(differences(&made, &kept), expected);
 }
 
 fn json(path: &Path) -> Value {

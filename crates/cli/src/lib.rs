@@ -15,12 +15,12 @@ mod eval;
 mod fetch;
 mod graph;
 mod prep;
-mod schema;
 mod terminal;
 
 use std::ffi::OsString;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
 
 pub use fetch::{cache_folder, find_weights};
 use terminal::Outcome;
@@ -54,9 +54,11 @@ enum Command {
     Graph(graph::Command),
     /// Downloads LPIPS' weights and Blender, which are not part of the tool.
     Fetch(fetch::FetchArgs),
-    /// Writes the JSON Schemas of the format's files.
-    #[command(hide = true)]
-    Schema(schema::SchemaArgs),
+    /// Prints the completions of a shell: `mateval completions bash > ~/.local/share/bash-completion/completions/mateval`.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
 }
 
 /// Runs the command with these words, of which the first is the program's name, and returns its exit code.
@@ -95,6 +97,10 @@ fn carry_out(command: &Command) -> anyhow::Result<Outcome> {
         Command::Eval(command) => eval::run(command),
         Command::Graph(command) => graph::run(command),
         Command::Fetch(args) => args.run(),
-        Command::Schema(args) => args.run(),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "mateval", &mut script);
+            terminal::print(&String::from_utf8_lossy(&script)).map(|()| Outcome::Good)
+        }
     }
 }
