@@ -8,6 +8,8 @@ use mateval_baselines::adapter::Adapter;
 use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_dataset::open::Dataset;
+use mateval_submission::SubmissionError;
+use mateval_submission::archive::{self, Opened};
 
 use crate::terminal::{Outcome, counted, print, say};
 
@@ -27,6 +29,11 @@ pub fn open_dataset(root: &Path) -> anyhow::Result<Dataset> {
         say(&absence);
     }
     Ok(dataset)
+}
+
+/// Opens a submission; an archive is unpacked to a temporary folder, which goes with the value.
+pub fn open_submission(path: &Path) -> Result<Opened, SubmissionError> {
+    archive::open(path, &std::env::temp_dir())
 }
 
 /// Fails where no file can be written to `path`, the value of `flag`; `kind` names the file in messages.

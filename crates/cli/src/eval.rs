@@ -15,12 +15,12 @@ use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_metrics::{Lpips, Net};
 use mateval_report::pair::{PairValues, compare};
 use mateval_submission::SubmissionError;
-use mateval_submission::archive::{self, Opened};
+use mateval_submission::archive::Opened;
 use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
 use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs};
 use crate::TOOL;
-use crate::arguments::{Format, check_output_file};
+use crate::arguments::{Format, check_output_file, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
 use crate::terminal::{Outcome, print, say_findings, with_progress};
 
@@ -94,7 +94,7 @@ impl LintArgs {
 }
 
 fn lint_report(args: &LintArgs, dataset: &Dataset) -> Result<LintFile, SubmissionError> {
-    let opened = match archive::open(&args.submission, &std::env::temp_dir()) {
+    let opened = match open_submission(&args.submission) {
         // An unsound archive is a result of the check, not a failure to check.
         Err(SubmissionError::Archive { findings, .. }) => return Ok(refused(dataset, TOOL, findings)),
         opened => opened?,
@@ -158,8 +158,7 @@ impl ScoreArgs {
         }
         check_results(&outs, self)?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
-        let work = std::env::temp_dir();
-        let opened = self.submissions.iter().map(|path| archive::open(path, &work)).collect::<Result<Vec<_>, _>>()?;
+        let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         let cache = self.cache.clone().unwrap_or_else(|| cache_beside(&self.out));
         if self.cache.is_some() && !self.only_cached {
             // A folder that cannot be made is found before anything is scored.
@@ -258,7 +257,7 @@ impl VerifyArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         self.out.iter().try_for_each(|out| check_output_file(out, "--out", "verification", self.force))?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
-        let opened = archive::open(&self.submission, &std::env::temp_dir())?;
+        let opened = open_submission(&self.submission)?;
         let plan = VerifyPlan {
             result: &self.result,
             submission: opened.root(),

@@ -18,6 +18,13 @@ pub enum SceneError {
         path: PathBuf,
         source: std::io::Error,
     },
+    /// The path is not the folder of a finished dataset.
+    #[error("'{}' is not a dataset: {reason}", path.display())]
+    NotADataset {
+        path: PathBuf,
+        /// What was found, and what to do.
+        reason: String,
+    },
     /// A folder that did not exist when work on it began exists now.
     #[error("'{}' was made by another process meanwhile; it stays as it is, and this run's result is removed", path.display())]
     MadeMeanwhile { path: PathBuf },

@@ -32,15 +32,14 @@ impl Dataset {
     /// where the manifest is not the one that `dataset.json` names. Faults of several files are reported together.
     /// Other files are not hashed: see [`Dataset::check_files`]. A scene may be missing as a whole, but not in part.
     pub fn open(root: &Path) -> Result<Self, SceneError> {
-        let path = root.join(DATASET);
-        let file: DatasetFile = json::read_format(&path, FORMAT)?;
+        let file = read_dataset_file(root)?;
         let found = manifest::sha256_of_file(&root.join(MANIFEST))?;
         if found != file.manifest_sha256 {
             let what = format!(
                 "manifest_sha256 is {}, but MANIFEST.sha256 hashes to {found}; an unfinished `prep` or a changed file",
                 file.manifest_sha256
             );
-            return Err(SceneError::Unsupported { path, what });
+            return Err(SceneError::Unsupported { path: root.join(DATASET), what });
         }
         let absent = absent_scenes(root, &file)?;
         // What a lost process left unfinished is no scene.
@@ -130,6 +129,29 @@ pub fn check_whole(root: &Path, file: &DatasetFile) -> Result<(), SceneError> {
         return Ok(());
     }
     Err(SceneError::AbsentScenes { dataset: root.to_owned(), absent, total: file.scenes.len() })
+}
+
+/// Reads `dataset.json` of the dataset in `root`. Fails with what is there instead of a dataset.
+pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, SceneError> {
+    let path = root.join(DATASET);
+    if path.is_file() {
+        return json::read_format(&path, FORMAT);
+    }
+    let below = || {
+        let mut folders: Vec<PathBuf> = std::fs::read_dir(root).ok()?.flatten().map(|entry| entry.path()).collect();
+        folders.sort_unstable();
+        folders.into_iter().find(|folder| folder.join(DATASET).is_file())
+    };
+    let reason = match std::fs::metadata(root) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => "the folder does not exist".to_owned(),
+        Err(source) => return Err(SceneError::Io { action: "read", path: root.to_owned(), source }),
+        Ok(data) if !data.is_dir() => "it is a file; expected a folder with a dataset.json".to_owned(),
+        Ok(_) => match below() {
+            Some(folder) => format!("it has no dataset.json, but '{}' has one", folder.display()),
+            None => "it has no dataset.json; where its build did not finish, run `mateval prep build` again".to_owned(),
+        },
+    };
+    Err(SceneError::NotADataset { path: root.to_owned(), reason })
 }
 
 /// The scenes that `dataset.json` and the manifest list and whose folders do not exist, in the order of `dataset.json`.
@@ -275,6 +297,23 @@ mod tests {
     use crate::Role;
 
     /// The error for an untrusted word names its place in the file.
+    #[test]
+    fn what_is_not_a_dataset_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let reason = |root: &Path| match read_dataset_file(root) {
+            Err(SceneError::NotADataset { reason, .. }) => reason,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(reason(&folder.path().join("nowhere")), "the folder does not exist");
+        assert_eq!(reason(&file), "it is a file; expected a folder with a dataset.json");
+        assert!(reason(folder.path()).ends_with("run `mateval prep build` again"));
+        std::fs::create_dir(folder.path().join("inner")).unwrap();
+        std::fs::write(folder.path().join("inner/dataset.json"), "{}").unwrap();
+        assert!(reason(folder.path()).ends_with("inner' has one"));
+    }
+
     #[test]
     fn unknown_roles_sources_and_lights_are_refused() {
         let folder = tempfile::tempdir().unwrap();

@@ -15,9 +15,10 @@ use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, write};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
+use mateval_submission::archive::Opened;
 
 use crate::TOOL;
-use crate::arguments::Format;
+use crate::arguments::{Format, open_submission};
 use crate::terminal::{Outcome, print, say, with_progress};
 
 #[derive(clap::Args)]
@@ -96,7 +97,7 @@ pub struct ExplainArgs {
     /// Folder of the dataset that the result was scored on.
     #[arg(long)]
     dataset: PathBuf,
-    /// Folder of the submission that was scored.
+    /// The submission that was scored: a folder, a .zip or a .tar.gz archive.
     #[arg(long)]
     submission: PathBuf,
     /// Protocol whose scores are explained.
@@ -118,11 +119,12 @@ impl ExplainArgs {
         self.out.iter().try_for_each(|out| explain::check_out(out, self.force))?;
         let result = ResultFile::read(&self.result)?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let submission = open_submission(&self.submission)?;
         let plan = ExplainPlan {
             result: &result,
             protocol: &self.protocol,
             dataset: &dataset,
-            submission: &self.submission,
+            submission: submission.root(),
             scene: &self.scene,
             tool: TOOL.to_owned(),
         };
@@ -202,7 +204,7 @@ impl StripArgs {
 
 #[derive(clap::Args)]
 pub struct PicturesArgs {
-    /// Folders of submissions; each has a column after the truth's.
+    /// Submissions: folders, .zip or .tar.gz archives. Each has a column after the truth's.
     #[arg(required = true, value_name = "SUBMISSION")]
     submissions: Vec<PathBuf>,
     /// Folder of the dataset.
@@ -225,7 +227,8 @@ impl PicturesArgs {
     /// Writes the pictures and prints their paths.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
-        let submissions: Vec<&Path> = self.submissions.iter().map(PathBuf::as_path).collect();
+        let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
+        let submissions: Vec<&Path> = opened.iter().map(Opened::root).collect();
         let plan = StripPlan {
             dataset: &dataset,
             submissions: &submissions,
@@ -264,7 +267,7 @@ pub struct LeaderboardArgs {
     /// Folder of the dataset, to draw pictures of each `--submission`.
     #[arg(long, requires = "submissions")]
     dataset: Option<PathBuf>,
-    /// Folder of a submission to show beside the truth; may be given several times.
+    /// A submission to show beside the truth: a folder, a .zip or a .tar.gz archive; may be given several times.
     #[arg(long = "submission", value_name = "SUBMISSION", requires = "dataset")]
     submissions: Vec<PathBuf>,
     #[command(flatten)]
@@ -302,6 +305,7 @@ impl LeaderboardArgs {
             ));
         }
         let dataset = self.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
+        let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         if let Some(pictures) = self.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
             bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
         }
@@ -315,7 +319,7 @@ impl LeaderboardArgs {
             pictures: self.pictures.as_deref(),
             submissions: dataset.as_ref().map(|dataset| Submissions {
                 dataset,
-                folders: self.submissions.clone(),
+                folders: opened.iter().map(|submission| submission.root().to_owned()).collect(),
                 shown: self.strips.shown_in_leaderboard(dataset),
             }),
             tool: TOOL.to_owned(),

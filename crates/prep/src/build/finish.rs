@@ -17,7 +17,7 @@ use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS, is_render
 use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::manifest::change_scene;
 use mateval_dataset::manifest::{self, sha256_of_bytes, sha256_of_file};
-use mateval_dataset::open::check_whole;
+use mateval_dataset::open::{check_whole, read_dataset_file};
 use mateval_dataset::render_file::RENDER_FILE;
 use mateval_dataset::work_folder::{self, remove};
 use mateval_dataset::{Progress, RendererId, Report, SceneError, SceneId, json};
@@ -105,7 +105,7 @@ fn finish_with(
 
 /// Writes the manifest and `dataset.json` again, after scenes that the dataset lists were rendered.
 pub fn finish_again(root: &Path, progress: Progress<'_>) -> Result<DatasetFile, PrepError> {
-    let mut dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
+    let mut dataset = read_dataset_file(root)?;
     check_whole(root, &dataset)?;
     let _lease = BuildFolder::of(root).lease_of_whole(&dataset.scenes)?;
     manifest::remove_unfinished(&root.join("scenes"))?;

@@ -14,10 +14,10 @@ pub(crate) mod run;
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, View};
+use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder};
-use mateval_dataset::open::chosen_ids;
+use mateval_dataset::open::{chosen_ids, read_dataset_file};
 use mateval_dataset::render_file::RenderFile;
 use mateval_dataset::render_file::RenderNoise;
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
@@ -98,7 +98,7 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
     if build_recipe.is_some() && !root.join(DATASET).is_file() {
         return Err(PrepError::unusable(root, UNFINISHED));
     }
-    let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
+    let dataset = read_dataset_file(root)?;
     if !root.join(MANIFEST).is_file() {
         return Err(PrepError::unusable(root, UNFINISHED));
     }
