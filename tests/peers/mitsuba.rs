@@ -1,4 +1,4 @@
-//! Compares the tracer with Mitsuba 3 on scenes exported by `mateval_audit::mitsuba_export`.
+//! Compares the tracer with Mitsuba 3 on scenes exported by `mateval_export::mitsuba`.
 //!
 //! Each measurement is printed on a line. If `MATEVAL_TEST_PICTURES` names a folder, both pictures of each scene are
 //! written there side by side, with their difference (grey where they are equal).
@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use mateval_audit::mitsuba_export::export;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, Severity};
+use mateval_export::mitsuba::export;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
 use mateval_tracer::{RenderSettings, World, render};
 

@@ -1,50 +1,9 @@
-//! The dependencies between the crates (one way, no others) and the licences of all packages, from `cargo metadata`.
+//! The dependencies between the crates, which are those that `crates/README.md` draws, and the licences of all packages,
+//! from `cargo metadata`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
-
-/// The crates of ours that each crate may use; names without `mateval-`.
-pub const ARROWS: [(&str, &[&str]); 18] = [
-    ("mateval-image", &[]),
-    ("mateval-dataset", &["image"]),
-    ("mateval-metrics", &["image"]),
-    ("mateval-procedural", &[]),
-    ("mateval-tracer", &["dataset", "image"]),
-    ("mateval-light", &["dataset", "image", "tracer"]),
-    ("mateval-sample", &["dataset", "image"]),
-    ("mateval-sources", &["dataset", "image", "tracer"]),
-    ("mateval-prep", &["sources", "dataset", "image", "tracer"]),
-    ("mateval-audit", &["prep", "dataset", "image", "metrics", "tracer"]),
-    ("mateval-export", &["dataset", "image"]),
-    ("mateval-baselines", &["dataset", "image", "tracer", "light", "procedural"]),
-    ("mateval-submission", &["dataset", "image", "tracer"]),
-    ("mateval-eval", &["submission", "light", "metrics", "tracer", "dataset", "image"]),
-    ("mateval-report", &["eval", "submission", "metrics", "dataset", "image"]),
-    ("mateval-release", &["audit", "eval", "prep", "report", "dataset", "image"]),
-    (
-        "mateval",
-        &[
-            "image",
-            "dataset",
-            "metrics",
-            "tracer",
-            "light",
-            "procedural",
-            "sample",
-            "sources",
-            "prep",
-            "audit",
-            "export",
-            "baselines",
-            "submission",
-            "eval",
-            "report",
-            "release",
-        ],
-    ),
-    ("mateval-python", &["mateval", "image", "scene", "metrics", "baselines", "submission", "eval"]),
-];
 
 /// Crates that only tests and benchmarks may use.
 const FOR_TESTS: &str = "mateval-testkit";
@@ -79,12 +38,32 @@ fn metadata() -> Metadata {
         .unwrap()
 }
 
-/// The dependencies of a package that are not allowed.
-fn forbidden(package: &str, used: &[&str]) -> Vec<String> {
-    let allowed = ARROWS.iter().find(|(name, _)| *name == package).map(|(_, allowed)| *allowed);
-    let Some(allowed) = allowed else { return vec![format!("'{package}' is a crate that `ARROWS` does not list")] };
-    let wrong = used.iter().filter(|name| !allowed.contains(&name.strip_prefix("mateval-").unwrap_or(name)));
-    wrong.map(|name| format!("{package} -> {name}")).collect()
+/// The crates of ours that each crate uses, as a map draws them: lines as `prep -> sources, dataset`. The arrows of `cli`,
+/// the package that is called like the project, lead to all other crates but `python`, which uses it.
+fn drawn(map: &str) -> BTreeMap<&str, BTreeSet<&str>> {
+    let is_word = |user: &str| !user.is_empty() && user.chars().all(|c| c.is_ascii_lowercase());
+    let lines = map.lines().filter_map(|line| line.split_once(" -> "));
+    let lines = lines.map(|(user, used)| (user.trim(), used)).filter(|(user, _)| is_word(user));
+    let mut arrows: BTreeMap<&str, BTreeSet<&str>> = lines
+        .map(|(user, used)| (user, used.split(", ").map(str::trim).filter(|name| is_word(name)).collect()))
+        .collect();
+    let below: BTreeSet<&str> = arrows.keys().copied().filter(|name| !["cli", "python"].contains(name)).collect();
+    if let Some(used) = arrows.get_mut("cli") {
+        *used = below;
+    }
+    arrows
+}
+
+/// A crate's name on the map.
+fn short(package: &str) -> &str {
+    if package == "mateval" { "cli" } else { package.trim_start_matches("mateval-") }
+}
+
+/// The arrows of a package that the map does not draw, and those that it draws in vain.
+fn differences(package: &str, used: &[&str], drawn: &BTreeMap<&str, BTreeSet<&str>>) -> Vec<String> {
+    let Some(expected) = drawn.get(short(package)) else { return vec![format!("the map has no '{package}'")] };
+    let used: BTreeSet<&str> = used.iter().map(|name| short(name)).collect();
+    used.symmetric_difference(expected).map(|name| format!("{} -> {name}", short(package))).collect()
 }
 
 /// The crates of ours that the package uses when it is built (not when it is tested).
@@ -94,28 +73,30 @@ fn uses(package: &Package) -> Vec<&str> {
 }
 
 #[test]
-fn the_arrows_are_those_of_the_design() {
+fn the_arrows_are_those_of_the_map() {
+    let map = include_str!("../../crates/README.md");
+    let drawn = drawn(map);
     let metadata = metadata();
     let mut members = metadata.workspace_packages();
     members.retain(|package| package.name.as_str() != FOR_TESTS);
-    let names: BTreeSet<&str> = members.iter().map(|package| package.name.as_str()).collect();
-    assert_eq!(names, ARROWS.iter().map(|(name, _)| *name).collect());
-    let wrong: Vec<String> = members.iter().flat_map(|package| forbidden(&package.name, &uses(package))).collect();
+    let names: BTreeSet<&str> = members.iter().map(|package| short(&package.name)).collect();
+    assert_eq!(names, drawn.keys().copied().collect());
+    let wrong: Vec<String> =
+        members.iter().flat_map(|package| differences(&package.name, &uses(package), &drawn)).collect();
     assert_eq!(wrong, [""; 0]);
     let all: usize = members.iter().map(|package| uses(package).len()).sum();
     assert!(all > 40, "only {all} arrows seen");
 }
 
-/// The twin: dependencies in the opposite direction.
+/// The twin: dependencies in the opposite direction, and arrows that nothing follows.
 #[test]
-fn an_arrow_back_is_found() {
-    assert_eq!(forbidden("mateval-image", &["mateval-dataset"]), ["mateval-image -> mateval-dataset"]);
-    assert_eq!(
-        forbidden("mateval-metrics", &["mateval-image", "mateval-dataset"]),
-        ["mateval-metrics -> mateval-dataset"]
-    );
-    assert_eq!(forbidden("mateval-eval", &["mateval-prep"]), ["mateval-eval -> mateval-prep"]);
-    assert_eq!(forbidden("mateval-utils", &[]).len(), 1);
+fn a_wrong_arrow_is_found() {
+    let drawn = drawn("a    -> (none)\nb    -> a\nc -> a, b\ncli  -> all of them\nno arrow -> at all\n");
+    assert_eq!(differences("mateval-a", &["mateval-b"], &drawn), ["a -> b"]);
+    assert_eq!(differences("mateval-c", &["mateval-a"], &drawn), ["c -> b"]);
+    assert_eq!(differences("mateval-c", &["mateval-a", "mateval-b"], &drawn), [""; 0]);
+    assert_eq!(differences("mateval", &["mateval-a", "mateval-b"], &drawn), ["cli -> c"]);
+    assert_eq!(differences("mateval-utils", &[], &drawn).len(), 1);
 }
 
 /// Only one module may name obvhs, so only one crate may use it.

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, LazyLock};
 
-use mateval_audit::compare::file::{CompareFile, Quantity, State};
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::material::{ColorInput, MaterialModel};
@@ -16,6 +15,7 @@ use mateval_dataset::render_file::RenderNoise;
 use mateval_dataset::{RendererId, SceneId, reference};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
+use mateval_prep::compare::file::{CompareFile, Quantity, State};
 use mateval_prep::render::RendererKind;
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
@@ -234,7 +234,7 @@ fn check_page(out: &Path, file: &CompareFile) {
     assert_eq!(sorted, pictures);
     // Four pictures of each light; of geometry, three of each of five.
     assert_eq!(shown.len(), 5 * (4 * 4 + 5 * 3));
-    assert!(!html.contains("http") && html.contains(&mateval_audit::compare::report::verdict(file)));
+    assert!(!html.contains("http") && html.contains(&mateval_prep::compare::tables::verdict(file)));
 }
 
 /// The sample's own materials: tiles with plastic and glass do not decide; in the others the lamp is too noisy, which

@@ -1,8 +1,7 @@
-//! Checks `crates/README.md`, the map of the code, against the code: the paths, the dependencies, and the first lines.
+//! Checks `crates/README.md`, the map of the code, against the code: the paths, and the first lines.
 
 use std::path::{Path, PathBuf};
 
-use super::arrows::ARROWS;
 use super::sample::files_below;
 
 fn crates() -> PathBuf {
@@ -34,22 +33,6 @@ fn every_path_on_the_map_exists() {
 fn a_missing_path_is_found() {
     let text = "| a metric | `metrics/src/`, `metrics/src/nowhere.rs`, `cargo run -- demo` |";
     assert_eq!(missing(&named_paths(text)), ["metrics/src/nowhere.rs"]);
-}
-
-#[test]
-fn the_map_draws_the_arrows() {
-    let map = std::fs::read_to_string(crates().join("README.md")).unwrap();
-    for (package, used) in ARROWS.iter().filter(|(package, used)| *package != "mateval" && !used.is_empty()) {
-        let name = package.trim_start_matches("mateval-");
-        let drawn = map.lines().find_map(|line| line.split_once(" -> ").filter(|(user, _)| user.trim() == name));
-        let drawn = drawn.unwrap_or_else(|| panic!("no arrows of '{name}' in crates/README.md")).1;
-        let mut drawn: Vec<&str> = drawn.split(", ").map(str::trim).collect();
-        // The package of the command is called like the project.
-        let mut used: Vec<&str> = used.iter().map(|name| if *name == "mateval" { "cli" } else { *name }).collect();
-        drawn.sort_unstable();
-        used.sort_unstable();
-        assert_eq!(drawn, used, "{name}");
-    }
 }
 
 /// Whether a file begins with a line that states its content.

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use mateval_audit::compare::file::CompareFile;
-use mateval_release::ReleaseFile;
+use mateval_prep::compare::file::CompareFile;
+use mateval_report::release::ReleaseFile;
 use mateval_testkit::{copy_folder, kept_folder};
 use serde_json::{Value, json};
 
@@ -50,7 +50,7 @@ fn verdict(dataset: &Path, state: &str) -> Value {
     json!({
         "format": "mateval-compare/2", "tool": "mateval 9.8.7",
         "dataset": {"name": file["name"], "version": file["version"], "manifest_sha256": file["manifest_sha256"]},
-        "renderer": "blender", "bounds": mateval_audit::compare::file::BOUNDS, "agrees": state == "agrees",
+        "renderer": "blender", "bounds": mateval_prep::compare::file::BOUNDS, "agrees": state == "agrees",
         "scenes": [{"scene": "room", "kinds": ["lambert"], "tile_bound": 0.01, "samples_each_half": 4,
             "seeds": ["0000000000000001", "0000000000000002"], "source_materials": null, "views": views}],
     })

@@ -3,25 +3,23 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use mateval_audit::compare::file::CompareFile;
-use mateval_audit::stats::StatsFile;
 use mateval_baselines::encoding_report::EncodingReport;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::reference::{LightsFile, ReferenceFile, SourceMaterialsFile};
-use mateval_dataset::render_file;
-use mateval_dataset::render_file::RenderFile;
-use mateval_dataset::render_file::ScorerFile;
+use mateval_dataset::render_file::{RenderFile, ScorerFile, VerdictFile};
 use mateval_dataset::submission::SubmissionFile;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
+use mateval_prep::compare::file::CompareFile;
+use mateval_prep::stats::StatsFile;
 use mateval_prep::survey::SurveyFile;
-use mateval_release::ReleaseFile;
 use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::entries::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
+use mateval_report::release::ReleaseFile;
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
 use serde_json::Value;
@@ -64,7 +62,7 @@ fn schemas() -> [(&'static str, Schema); 26] {
         ("blender_job", schema_for!(BlenderJob)),
         ("blender_result", schema_for!(BlenderResult)),
         ("compare", schema_for!(CompareFile)),
-        ("compare_verdict", schema_for!(render_file::CompareFile)),
+        ("compare_verdict", schema_for!(VerdictFile)),
         ("encoding", schema_for!(EncodingReport)),
         ("import", schema_for!(ImportReport)),
         ("import_materials", schema_for!(FlatMaterials)),

@@ -7,11 +7,12 @@ mod publish;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_audit::compare::{CompareOptions, compare, report};
-use mateval_audit::stats;
 use mateval_dataset::work_folder::is_inside;
 use mateval_dataset::{SceneId, Severity, json};
 use mateval_image::store::write_whole;
+use mateval_prep::compare::{CompareOptions, compare, tables};
+use mateval_prep::stats;
+use mateval_prep::verify::verify;
 
 use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, samples_parser};
 use self::publish::{ExportArgs, MitsubaArgs, PublishArgs};
@@ -78,7 +79,7 @@ pub struct VerifyArgs {
 impl VerifyArgs {
     /// Checks the dataset and prints all findings.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let findings = with_progress(|progress| mateval_audit::verify::verify(&self.dataset, progress))
+        let findings = with_progress(|progress| verify(&self.dataset, progress))
             .with_context(|| format!("cannot verify '{}'", self.dataset.display()))?;
         let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
         match self.format {
@@ -136,7 +137,7 @@ impl CompareArgs {
             .context("cannot compare the dataset's pictures")?;
         match self.format {
             Format::Json => print(&json::to_text(&file))?,
-            Format::Text => print(&report::text(&file))?,
+            Format::Text => print(&tables::text(&file))?,
         }
         if let Some(out) = &self.out {
             say(&format!("{}: both pictures side by side", out.join("index.html").display()));

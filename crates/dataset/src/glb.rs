@@ -240,14 +240,14 @@ fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, buffers: &[&[u8]]) -> R
 }
 
 fn invalid(path: &Path, node: &str, message: String) -> SceneError {
-    let finding = Finding {
-        severity: Severity::Error,
-        code: "bad_geometry".to_owned(),
-        file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        place: if node.is_empty() { String::new() } else { format!("node '{node}'") },
+    let finding = Finding::new(
+        Severity::Error,
+        "bad_geometry",
+        path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        if node.is_empty() { String::new() } else { format!("node '{node}'") },
         message,
-        action: "fetch or build the dataset again".to_owned(),
-    };
+        "fetch or build the dataset again",
+    );
     SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
 }
 

@@ -145,14 +145,14 @@ fn pointer<T: DeserializeOwned>(text: &[u8]) -> String {
 }
 
 fn invalid(path: &Path, place: String, message: String) -> SceneError {
-    let finding = Finding {
-        severity: Severity::Error,
-        code: "bad_json".to_owned(),
-        file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    let finding = Finding::new(
+        Severity::Error,
+        "bad_json",
+        path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         place,
         message,
-        action: "fix the file; `mateval prep verify` lists every fault of a dataset".to_owned(),
-    };
+        "fix the file; `mateval prep verify` lists every fault of a dataset",
+    );
     SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
 }
 

@@ -220,14 +220,7 @@ fn unlisted_file(root: &Path, file: &str) -> Finding {
 }
 
 fn fault(code: &str, file: &str, place: String, message: &str) -> Finding {
-    Finding {
-        severity: Severity::Error,
-        code: code.to_owned(),
-        file: file.to_owned(),
-        place,
-        message: message.to_owned(),
-        action: "fetch or build the dataset again".to_owned(),
-    }
+    Finding::new(Severity::Error, code, file, place, message, "fetch or build the dataset again")
 }
 
 /// The listed files of a scene.

@@ -196,14 +196,14 @@ fn together(root: &Path, mut faults: Vec<(String, SceneError)>) -> SceneError {
 }
 
 fn unreadable(file: String, fault: &SceneError) -> Finding {
-    Finding {
-        severity: Severity::Error,
-        code: "unreadable".to_owned(),
+    Finding::new(
+        Severity::Error,
+        "unreadable",
         file,
-        place: String::new(),
-        message: fault.to_string(),
-        action: "`mateval prep verify` lists every fault of a dataset".to_owned(),
-    }
+        "",
+        fault.to_string(),
+        "`mateval prep verify` lists every fault of a dataset",
+    )
 }
 
 fn read_targets(root: &Path) -> Result<TargetsFile, SceneError> {

@@ -429,14 +429,14 @@ struct Faults(Vec<Finding>);
 
 impl Faults {
     fn add(&mut self, file: &str, place: impl Into<String>, message: String) {
-        self.0.push(Finding {
-            severity: Severity::Error,
-            code: "dangling_reference".to_owned(),
-            file: file.to_owned(),
-            place: place.into(),
+        self.0.push(Finding::new(
+            Severity::Error,
+            "dangling_reference",
+            file,
+            place.into(),
             message,
-            action: "fetch or build the dataset again".to_owned(),
-        });
+            "fetch or build the dataset again",
+        ));
     }
 
     /// Adds every texture's file name that leads out of `textures/`, and every index of a texture out of range.

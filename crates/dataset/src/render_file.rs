@@ -111,7 +111,7 @@ pub const VERDICT_FORMAT: &str = "mateval-compare/1";
 /// A dataset's `compare.json`, which `mateval prep compare` writes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CompareFile {
+pub struct VerdictFile {
     /// Always `mateval-compare/1`.
     pub format: String,
     /// The program that compared and its version, as in `mateval 0.1.0`.
@@ -135,7 +135,7 @@ pub struct CompareCounts {
     pub too_noisy: usize,
 }
 
-impl CompareFile {
+impl VerdictFile {
     /// The file of the dataset in `root`; absent if it does not exist. It may be about an earlier state of the dataset.
     pub fn read_beside(root: &Path) -> Result<Option<Self>, SceneError> {
         let path = root.join(COMPARE);
@@ -176,11 +176,11 @@ mod tests {
         assert_eq!(RenderNoise::of([&flat(1.0), &flat(1.0)], &flat(1.5)).denoised_mse, 0.25);
     }
 
-    fn verdict(manifest: &str, scenes: &[(&str, usize)]) -> CompareFile {
+    fn verdict(manifest: &str, scenes: &[(&str, usize)]) -> VerdictFile {
         let counts = |&(id, agree): &(&str, usize)| {
             (SceneId::new(id).unwrap(), CompareCounts { agree, ..CompareCounts::default() })
         };
-        CompareFile {
+        VerdictFile {
             format: VERDICT_FORMAT.to_owned(),
             tool: "test".to_owned(),
             manifest_sha256: manifest.to_owned(),
@@ -195,16 +195,16 @@ mod tests {
         std::fs::create_dir(root.join("scenes")).unwrap();
         std::fs::write(root.join("scenes/a"), "a").unwrap();
         let identity = manifest::write(root).unwrap();
-        assert_eq!(CompareFile::read_beside(root).unwrap(), None);
+        assert_eq!(VerdictFile::read_beside(root).unwrap(), None);
         verdict("one", &[("hall", 1), ("room", 2)]).add_beside(root).unwrap();
         verdict("one", &[("room", 3), ("attic", 4)]).add_beside(root).unwrap();
         let all = verdict("one", &[("attic", 4), ("hall", 1), ("room", 3)]);
-        assert_eq!(CompareFile::read_beside(root).unwrap(), Some(all));
+        assert_eq!(VerdictFile::read_beside(root).unwrap(), Some(all));
         verdict("two", &[("room", 5)]).add_beside(root).unwrap();
-        assert_eq!(CompareFile::read_beside(root).unwrap(), Some(verdict("two", &[("room", 5)])));
+        assert_eq!(VerdictFile::read_beside(root).unwrap(), Some(verdict("two", &[("room", 5)])));
         assert_eq!(manifest::check(root).unwrap(), [], "the manifest does not concern it");
         assert_eq!(manifest::write(root).unwrap(), identity);
         std::fs::write(root.join(COMPARE), "{").unwrap();
-        CompareFile::read_beside(root).unwrap_err();
+        VerdictFile::read_beside(root).unwrap_err();
     }
 }

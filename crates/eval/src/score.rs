@@ -10,7 +10,7 @@ use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::open::DatasetId;
-use mateval_dataset::render_file::{CompareCounts, CompareFile};
+use mateval_dataset::render_file::{CompareCounts, VerdictFile};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
 use mateval_metrics::Lpips;
@@ -418,7 +418,7 @@ fn has_references(dataset: &Dataset) -> bool {
 
 /// The verdict of `prep compare` on this very dataset; absent if it was not run.
 fn tracer_check(dataset: &Dataset) -> Result<Option<TracerCheck>, EvalError> {
-    let file = CompareFile::read_beside(&dataset.root)?;
+    let file = VerdictFile::read_beside(&dataset.root)?;
     let file = file.filter(|file| file.manifest_sha256 == dataset.file.manifest_sha256);
     Ok(file.map(|file| {
         let sum = |of: fn(&CompareCounts) -> usize| file.scenes.values().map(of).sum::<usize>();

@@ -8,7 +8,7 @@ use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{INPUT, MANIFEST};
 use mateval_dataset::manifest::{self, Entry, MISSING_FILE};
 use mateval_dataset::open::{Dataset, is_below};
-use mateval_dataset::{Camera, Finding, Progress, Report, SceneError, SceneId};
+use mateval_dataset::{Camera, Finding, Progress, Report, SceneError, SceneId, ViewId};
 use mateval_image::store::write_whole;
 
 /// A format that a dataset can be written in.
@@ -77,6 +77,14 @@ pub enum ExportError {
     /// The output would lie in the dataset.
     #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --out", path.display())]
     OutputInDataset { path: PathBuf },
+    /// The scene has no such view.
+    #[error("'{}' has no view '{view}' of the scene '{scene}'", path.display())]
+    NoView {
+        path: PathBuf,
+        scene: SceneId,
+        /// The view that it does not have.
+        view: ViewId,
+    },
     /// The Parquet file could not be written.
     #[error("cannot write '{}': {source}", path.display())]
     Parquet { path: PathBuf, source: parquet::errors::ParquetError },

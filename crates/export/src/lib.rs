@@ -4,12 +4,13 @@
 //!
 //! [`export`] opens and checks the dataset, lists its views with their pictures and licences ([`dataset`]), and passes
 //! them to the format's own file: [`mod@tars`], [`croissant`] (which describes those tars), [`huggingface`], or
-//! [`cameras`] (COLMAP and nerfstudio).
+//! [`cameras`] (COLMAP and nerfstudio). [`mitsuba`] writes one view as a scene for Mitsuba 3.
 
 pub mod cameras;
 pub mod croissant;
 pub mod dataset;
 pub mod huggingface;
+pub mod mitsuba;
 pub mod tars;
 
 use std::path::{Path, PathBuf};

@@ -8,8 +8,9 @@ use mateval_dataset::{SceneId, ViewId};
 
 use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
+use crate::render::RendererKind;
 
-/// Why a dataset, its renders or a survey could not be made.
+/// Why a dataset, its renders or a survey could not be made or examined.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepError {
     /// A file or folder could not be read or written.
@@ -99,6 +100,31 @@ pub enum PrepError {
         expected: [usize; 2],
         /// Width and height of the map, in pixels.
         found: [usize; 2],
+    },
+    /// The renderer has rendered no view of any of the scenes.
+    #[error(
+        "'{}' has no pictures by {renderer} of scene {}; run `mateval prep render DATASET --renderer {renderer}`",
+        path.display(), quoted(scenes)
+    )]
+    NotRendered { path: PathBuf, renderer: RendererKind, scenes: Vec<SceneId> },
+    /// A view's pictures do not have the size of its camera's picture.
+    #[error(
+        "'{}' contains pictures that do not have the camera's {}x{} pixels; run `mateval prep verify`",
+        path.display(), expected[0], expected[1]
+    )]
+    ViewSize {
+        path: PathBuf,
+        /// Width and height of the camera's picture, in pixels.
+        expected: [usize; 2],
+    },
+    /// The pictures of one view under each light are larger than the memory reserved for them.
+    #[error("scene '{scene}': the pictures of one view under {lights} lights take more than {most_bytes} bytes")]
+    TooManyLights {
+        scene: SceneId,
+        /// The number of its lights.
+        lights: usize,
+        /// The memory reserved, in bytes.
+        most_bytes: u64,
     },
     /// The output folder holds scenes that the recipe would make otherwise, or not at all.
     #[error("'{}' holds a build of another recipe, other source files or another version:{}", path.display(), other_scenes(changed, dropped))]

@@ -136,14 +136,14 @@ pub struct Faults {
 impl Faults {
     /// Adds a fault of `file` at `place`.
     pub fn add(&mut self, code: &str, file: &str, place: impl Into<String>, message: impl Into<String>) {
-        self.all.push(Finding {
-            severity: Severity::Error,
-            code: code.to_owned(),
-            file: format!("{}{file}", self.prefix),
-            place: place.into(),
-            message: message.into(),
-            action: "download the dataset again, or build it again".to_owned(),
-        });
+        self.all.push(Finding::new(
+            Severity::Error,
+            code,
+            format!("{}{file}", self.prefix),
+            place.into(),
+            message.into(),
+            "download the dataset again, or build it again",
+        ));
     }
 
     /// The value; or none, after adding the reason why it could not be read.

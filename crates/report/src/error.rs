@@ -9,7 +9,7 @@ use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
 
-/// Why results could not be shown.
+/// Why results could not be shown, or a dataset not be published or described.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// Results cannot be shown together, or do not match the dataset or the submission: every reason.
@@ -27,6 +27,25 @@ pub enum ReportError {
     /// Every reason.
     #[error("these results cannot make a leaderboard:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
+    /// Files that were given are not about the dataset that is released, or are something else: every reason. Correct
+    /// them, or leave them out.
+    #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
+    UnfitForRelease(Vec<Finding>),
+    #[error(
+        "'{}' holds no .json file; expected what `mateval prep compare --out` or `--format json` writes, in the folder \
+         or directly below it",
+        folder.display()
+    )]
+    NoVerdicts { folder: PathBuf },
+    /// A folder that is not the report of a release would be replaced: choose another one.
+    #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
+    NotAReport { path: PathBuf },
+    /// The report would lie in the dataset: choose another place.
+    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
+    OutputInDataset { path: PathBuf },
+    /// The dataset has no ground truth that could be withheld.
+    #[error("'{}' has no ground truth to withhold", path.display())]
+    NoGroundTruth { path: PathBuf },
     #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
     NothingToShow {
         protocol: String,
@@ -48,6 +67,9 @@ pub enum ReportError {
     /// The dataset could not be read, or a file could not be read or written.
     #[error(transparent)]
     Dataset(#[from] mateval_dataset::SceneError),
+    /// The dataset could not be verified, or its recipe not be read.
+    #[error(transparent)]
+    Prep(#[from] mateval_prep::PrepError),
     /// A scene could not be rendered or scored again.
     #[error(transparent)]
     Eval(#[from] mateval_eval::EvalError),

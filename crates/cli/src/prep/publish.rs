@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_audit::mitsuba_export::{self, export_view};
-use mateval_audit::publish::publish;
-use mateval_dataset::work_folder::is_inside;
-use mateval_dataset::{SceneId, Severity, ViewId};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::work_folder::{check_free, is_inside};
+use mateval_dataset::{Finding, SceneId, Severity, ViewId};
+use mateval_export::mitsuba::export_view;
 use mateval_export::{ExportOptions, Exported, Format, croissant, export};
-use mateval_release::file::Day;
-use mateval_release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
+use mateval_prep::recipe::{self, RECIPE};
+use mateval_report::publish::publish;
+use mateval_report::release::file::Day;
+use mateval_report::release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
 
 use crate::TOOL;
 use crate::prep::make::samples_parser;
@@ -264,15 +266,7 @@ pub struct MitsubaArgs {
 impl MitsubaArgs {
     /// Exports the view and reports what Mitsuba cannot express.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let options = mitsuba_export::ExportOptions {
-            dataset: self.dataset.clone(),
-            scene: self.scene.clone(),
-            view: self.view.clone(),
-            samples: self.samples,
-            out: self.out.clone(),
-            force: self.force,
-        };
-        let findings = export_view(&options).context("cannot export to Mitsuba")?;
+        let findings = self.export().context("cannot export to Mitsuba")?;
         for finding in &findings {
             say(&format!("{}: {finding}", self.scene));
         }
@@ -281,5 +275,15 @@ impl MitsubaArgs {
         let file = self.out.join("scene.xml");
         print(&format!("{}: {verdict} in Mitsuba, {}\n", file.display(), counted(differences, "difference")))?;
         Ok(if differences == 0 { Outcome::Good } else { Outcome::No })
+    }
+
+    fn export(&self) -> anyhow::Result<Vec<Finding>> {
+        check_free(&self.out, self.force, "folder")?;
+        let dataset = Dataset::open(&self.dataset)?;
+        let samples = match self.samples {
+            Some(samples) => samples,
+            None => recipe::read(&self.dataset.join(RECIPE))?.0.samples,
+        };
+        Ok(export_view(&dataset, &self.scene, &self.view, samples, &self.out)?)
     }
 }

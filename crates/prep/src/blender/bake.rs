@@ -112,7 +112,7 @@ impl BakedFinding {
     /// The finding about the file `file`.
     pub fn of_file(&self, file: &str) -> Finding {
         let Self { code, place, message, action } = self.clone();
-        Finding { severity: Severity::Warning, code, file: file.to_owned(), place, message, action }
+        Finding::new(Severity::Warning, &code, file, place, message, action)
     }
 }
 

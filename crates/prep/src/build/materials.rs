@@ -187,24 +187,26 @@ fn atlas_finding(plan: &Plan, instance: &InstanceEntry, code: &str, message: &st
         "unmapped_triangles" => "placed each on one point of the atlas; their area is negligible",
         _ => "kept the size; the truth is as coarse as its texels",
     };
-    Finding {
-        severity: if code == "no_atlas" { Severity::Warning } else { Severity::Note },
-        code: code.to_owned(),
-        file: plan.file.clone(),
-        place: format!("instance '{}'", instance.id),
-        message: message.to_owned(),
-        action: action.to_owned(),
-    }
+    Finding::new(
+        if code == "no_atlas" { Severity::Warning } else { Severity::Note },
+        code,
+        plan.file.clone(),
+        format!("instance '{}'", instance.id),
+        message,
+        action,
+    )
 }
 
 fn clipped_finding(plan: &Plan, instance: &InstanceEntry, baked: &Baked) -> Option<Finding> {
-    baked.clipped.then(|| Finding {
-        severity: Severity::Warning,
-        code: "base_color_clipped".to_owned(),
-        file: plan.file.clone(),
-        place: format!("instance '{}'", instance.id),
-        message: "its base colour exceeds 0..1".to_owned(),
-        action: "clipped it in the baked texture, but not in the truth's pictures".to_owned(),
+    baked.clipped.then(|| {
+        Finding::new(
+            Severity::Warning,
+            "base_color_clipped",
+            plan.file.clone(),
+            format!("instance '{}'", instance.id),
+            "its base colour exceeds 0..1",
+            "clipped it in the baked texture, but not in the truth's pictures",
+        )
     })
 }
 

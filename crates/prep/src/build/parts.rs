@@ -245,14 +245,14 @@ pub(crate) fn read_labels(
 }
 
 fn unlabelled(id: &PartSetId, instance: &InstanceEntry, folder: &str) -> Finding {
-    Finding {
-        severity: Severity::Note,
-        code: "unlabelled".to_owned(),
-        file: folder.to_owned(),
-        place: String::new(),
-        message: format!("'{id}' has no labels of '{}'", instance.id),
-        action: "kept its own parts".to_owned(),
-    }
+    Finding::new(
+        Severity::Note,
+        "unlabelled",
+        folder,
+        "",
+        format!("'{id}' has no labels of '{}'", instance.id),
+        "kept its own parts",
+    )
 }
 
 /// A finding that names the files of the folder that match no instance, as those of another scene or with a mistyped
@@ -270,13 +270,15 @@ fn unused(
     let shown = unused[..unused.len().min(MAX_NAMES)].join(", ");
     let rest = unused.len().saturating_sub(MAX_NAMES);
     let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
-    Ok((!unused.is_empty()).then(|| Finding {
-        severity: Severity::Warning,
-        code: "unused_labels".to_owned(),
-        file: labels.to_owned(),
-        place: String::new(),
-        message: format!("{} files of '{id}' match no instance: {shown}{more}", unused.len()),
-        action: "ignored them".to_owned(),
+    Ok((!unused.is_empty()).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "unused_labels",
+            labels,
+            "",
+            format!("{} files of '{id}' match no instance: {shown}{more}", unused.len()),
+            "ignored them",
+        )
     }))
 }
 

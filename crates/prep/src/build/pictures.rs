@@ -86,14 +86,14 @@ pub(super) fn write_pictures(
 /// Adds a finding where a view is of little use: no pixel is valid, or a surface is too near to the camera.
 fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut Seen) {
     let mut warn = |code: &str, message: String, action: &str| {
-        seen.findings.push(Finding {
-            severity: Severity::Warning,
-            code: code.to_owned(),
-            file: plan.file.clone(),
-            place: format!("view '{view}'"),
+        seen.findings.push(Finding::new(
+            Severity::Warning,
+            code,
+            plan.file.clone(),
+            format!("view '{view}'"),
             message,
-            action: action.to_owned(),
-        });
+            action,
+        ));
     };
     let nearest = geometry.depth.pixels().iter().copied().filter(|depth| *depth > 0.0).reduce(f32::min);
     if let Some(nearest) = nearest.filter(|nearest| f64::from(*nearest) < TOO_NEAR_M) {
@@ -158,14 +158,14 @@ pub(super) fn check_missing(
     if share > MOST_MISSING && !entry.allow_missing {
         return Err(SceneFault::Missing { message, most: MOST_MISSING, findings: above_notes(findings) });
     }
-    Ok(Some(Finding {
-        severity: if share > FEW_MISSING { Severity::Warning } else { Severity::Note },
-        code: "missing_share".to_owned(),
-        file: file.to_owned(),
-        place: String::new(),
+    Ok(Some(Finding::new(
+        if share > FEW_MISSING { Severity::Warning } else { Severity::Note },
+        "missing_share",
+        file,
+        "",
         message,
-        action: "made the scene without them".to_owned(),
-    }))
+        "made the scene without them",
+    )))
 }
 
 /// A folder below `root`, or `root` itself, in which the missing file exists: by its whole path, or else by its own
@@ -232,14 +232,14 @@ pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> R
     if total > MOST_UNSTATED && !entry.allow_unstated {
         return Err(SceneFault::Unstated { message, most: MOST_UNSTATED, findings: above_notes(&plan.findings) });
     }
-    Ok(Some(Finding {
-        severity: Severity::Warning,
-        code: "unstated_base_color".to_owned(),
-        file: plan.file.clone(),
-        place: String::new(),
+    Ok(Some(Finding::new(
+        Severity::Warning,
+        "unstated_base_color",
+        plan.file.clone(),
+        "",
         message,
-        action: "used the default of the format as their truth".to_owned(),
-    }))
+        "used the default of the format as their truth",
+    )))
 }
 
 /// Whether any light reaches the input view. A photo from elsewhere has its own light.

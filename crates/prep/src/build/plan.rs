@@ -252,14 +252,14 @@ fn distance_m(drawn: &DrawnViews, number: u32) -> f64 {
 }
 
 fn finding(file: &str, place: &str, message: &str) -> Finding {
-    Finding {
-        severity: Severity::Warning,
-        code: "no_wide_view".to_owned(),
-        file: file.to_owned(),
-        place: place.to_owned(),
-        message: message.to_owned(),
-        action: "left the view out; choose other distances or another seed, or give its place by hand".to_owned(),
-    }
+    Finding::new(
+        Severity::Warning,
+        "no_wide_view",
+        file,
+        place,
+        message,
+        "left the view out; choose other distances or another seed, or give its place by hand",
+    )
 }
 
 /// The point in the middle of the input view at the median depth of ten by ten rays; none where no ray meets a surface.

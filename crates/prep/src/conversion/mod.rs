@@ -220,14 +220,14 @@ impl Converter<'_> {
     }
 
     fn finding(&mut self, material: &Material, severity: Severity, code: &str, message: &str, action: &str) {
-        self.findings.push(Finding {
+        self.findings.push(Finding::new(
             severity,
-            code: code.to_owned(),
-            file: self.file.to_owned(),
-            place: format!("material '{}'", mateval_dataset::findings::shortened(&material.name)),
-            message: message.to_owned(),
-            action: action.to_owned(),
-        });
+            code,
+            self.file,
+            format!("material '{}'", mateval_dataset::findings::shortened(&material.name)),
+            message,
+            action,
+        ));
     }
 }
 

@@ -245,17 +245,17 @@ impl BlenderScene<'_> {
             true => "(the log is empty)".to_owned(),
             false => format!("the log ends with:\n{}", failure.log),
         };
-        Finding {
-            severity: Severity::Error,
-            code: "blender_failed".to_owned(),
-            file: format!("scenes/{}", self.id),
-            place: String::new(),
-            message: format!("Blender failed: {}; {log}", failure.what),
-            action: format!(
+        Finding::new(
+            Severity::Error,
+            "blender_failed",
+            format!("scenes/{}", self.id),
+            "",
+            format!("Blender failed: {}; {log}", failure.what),
+            format!(
                 "to repeat the failure: {}; to render the scene, run the same `mateval` command again",
                 failure.repeat
             ),
-        }
+        )
     }
 }
 

@@ -298,14 +298,7 @@ fn repeated<'a>(
 }
 
 fn error(code: &str, path: &Path, place: &str, message: String, action: &str) -> Finding {
-    Finding {
-        severity: Severity::Error,
-        code: code.to_owned(),
-        file: path.display().to_string(),
-        place: place.to_owned(),
-        message,
-        action: action.to_owned(),
-    }
+    Finding::new(Severity::Error, code, path.display().to_string(), place, message, action)
 }
 
 /// Whether curves show the values of a picture, if its scene has wide views.

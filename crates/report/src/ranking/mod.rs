@@ -558,14 +558,7 @@ pub(crate) mod tests {
             unobserved: TexelErrors::default(),
         };
         gaps.protocols.get_mut("mateval-3").unwrap().texels = (0..12).map(|at| texels(scene(at))).collect();
-        let missing = |file: &str| Finding {
-            severity: Severity::Warning,
-            code: "missing_map".to_owned(),
-            file: file.to_owned(),
-            place: String::new(),
-            message: String::new(),
-            action: String::new(),
-        };
+        let missing = |file: &str| Finding::new(Severity::Warning, "missing_map", file, "", "", "");
         gaps.findings = vec![missing("scenes/s03/sofa/base_color.png"), missing("scenes/s04/sofa/roughness.png")];
         let results = [gaps, result("whole", &scores(31.0, 0.0))];
         for (partial, scenes) in [(false, 12), (true, 11)] {

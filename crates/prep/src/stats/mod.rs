@@ -17,7 +17,7 @@ use mateval_dataset::{Finding, FindingCount, Role, SceneError, SceneId, Severity
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::AuditError;
+use crate::error::PrepError;
 
 /// The value of `format` in this version of the statistics.
 pub const STATS_FORMAT: &str = "mateval-stats/1";
@@ -167,7 +167,7 @@ pub struct CategoryCount {
 }
 
 /// Counts the dataset. Fails where scenes or instances are listed twice, and reports all of them.
-pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, AuditError> {
+pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, PrepError> {
     let findings = duplicates(dataset);
     if !findings.is_empty() {
         return Err(SceneError::Invalid { path: dataset.root.clone(), findings }.into());
@@ -332,13 +332,15 @@ fn repeats<'a>(file: &str, list: &str, key: &str, ids: impl Iterator<Item = &'a 
     let mut seen = BTreeSet::new();
     ids.enumerate()
         .filter(|(_, id)| !seen.insert(*id))
-        .map(|(at, id)| Finding {
-            severity: Severity::Error,
-            code: "duplicate_id".to_owned(),
-            file: file.to_owned(),
-            place: format!("/{list}/{at}{key}"),
-            message: format!("'{id}' is listed twice"),
-            action: "download the dataset again, or build it again".to_owned(),
+        .map(|(at, id)| {
+            Finding::new(
+                Severity::Error,
+                "duplicate_id",
+                file,
+                format!("/{list}/{at}{key}"),
+                format!("'{id}' is listed twice"),
+                "download the dataset again, or build it again",
+            )
         })
         .collect()
 }
@@ -411,7 +413,7 @@ mod tests {
 
     fn finding(severity: Severity, code: &str) -> Finding {
         let [file, place, message, action] = [(); 4].map(|()| String::new());
-        Finding { severity, code: code.to_owned(), file, place, message, action }
+        Finding::new(severity, code, file, place, message, action)
     }
 
     fn dataset(scenes: Vec<SceneFile>) -> Dataset {

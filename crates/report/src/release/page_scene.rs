@@ -1,15 +1,15 @@
 //! What the page shows of one scene: a row of the table, and the folded details. Numbers are rounded here.
 
-use mateval_audit::compare::file::State;
-use mateval_audit::stats::SceneStats;
 use mateval_dataset::scene_cost::{Step, StepCost};
 use mateval_dataset::{Finding, Severity};
 use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
+use mateval_prep::compare::file::State;
+use mateval_prep::stats::SceneStats;
 use serde::Serialize;
 
-use crate::file::{ReleaseFile, ReleasedScene};
-use crate::given::{ReferenceScores, SceneVerdict, StateCount};
+use super::file::{ReleaseFile, ReleasedScene};
+use super::given::{ReferenceScores, SceneVerdict, StateCount};
 
 /// The scores of the table's columns.
 pub(crate) const SHOWN_SCORES: [(&str, ResultKey); 2] = [
@@ -219,7 +219,7 @@ fn findings(scene: &ReleasedScene) -> Cell {
 }
 
 fn views(scene: &ReleasedScene) -> Vec<[String; 3]> {
-    let row = |view: &crate::gathered::ViewNoise| {
+    let row = |view: &super::renders::ViewNoise| {
         let psnr = view.mean_of_halves_psnr_db.map_or_else(|| "no noise".to_owned(), |db| format!("{db:.2} dB"));
         [view.view.to_string(), psnr, format!("{:.2e}", view.denoised_mse)]
     };

@@ -5,6 +5,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::scene_meshes::Faults;
+use crate::scene_meshes::Meshes;
 use glam::DMat3;
 use mateval_dataset::dataset::{Part, SceneFile, View, WideView};
 use mateval_dataset::glb::GlbNode;
@@ -15,8 +17,6 @@ use mateval_dataset::submission::Map;
 use mateval_dataset::{Camera, ViewId};
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_prep::scene_meshes::Faults;
-use mateval_prep::scene_meshes::Meshes;
 use schemars::JsonSchema;
 
 /// Checks `folder/file` against the schema of `T`. Every violation is a fault with its JSON pointer.

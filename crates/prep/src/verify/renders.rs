@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use crate::scene_meshes::Faults;
 use mateval_dataset::dataset::{DatasetFile, Photo, SceneFile};
 use mateval_dataset::layout::{INPUT, SCORER_JSON, SceneFolder};
 use mateval_dataset::manifest::sha256_of_file;
@@ -11,7 +12,6 @@ use mateval_dataset::render_file::RenderFile;
 use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_dataset::{Finding, RendererId, Severity, json};
 use mateval_image::{LinearRgb, exr_io};
-use mateval_prep::scene_meshes::Faults;
 
 use super::scene::check_schema;
 
@@ -103,13 +103,15 @@ pub(super) fn check_scorer(
         return;
     }
     let action = format!("run `mateval prep render --only scorer --scene {} {}`", scene.id, root.display());
-    let found = |severity, code: &str, file: &str, place: &str, message: String| Finding {
-        severity,
-        code: code.to_owned(),
-        file: format!("scenes/{}/{file}", scene.id),
-        place: place.to_owned(),
-        message,
-        action: format!("{action}, then `mateval prep finish {}`", root.display()),
+    let found = |severity, code: &str, file: &str, place: &str, message: String| {
+        Finding::new(
+            severity,
+            code,
+            format!("scenes/{}/{file}", scene.id),
+            place,
+            message,
+            format!("{action}, then `mateval prep finish {}`", root.display()),
+        )
     };
     if !folder.scorer().exists() {
         if dataset.photo_renderer.is_some() {

@@ -5,18 +5,19 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::render::MAX_BOUNCES;
 use mateval_dataset::dataset::View;
 use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::{Camera, Progress, Report, SceneId, json};
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
-use mateval_prep::render::MAX_BOUNCES;
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 
 use super::file::{Check, STANDARD_ERRORS, State, file_check};
-use super::light::{Halves, ShownKinds, Tile, median};
-use crate::AuditError;
+use super::light::ShownKinds;
+use super::tiles::{Halves, Tile, median};
+use crate::error::PrepError;
 
 /// The folder of Blender's pictures of a view.
 #[derive(Clone, Debug)]
@@ -85,12 +86,12 @@ pub(super) fn render_ours(
     views: &[&View],
     samples: u32,
     progress: Progress<'_>,
-) -> Result<Vec<OurLight>, AuditError> {
+) -> Result<Vec<OurLight>, PrepError> {
     let settings = RenderSettings { samples, max_bounces: MAX_BOUNCES, ..Default::default() };
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let lights = world.scene().lights.len();
     let merged = |cameras: &[Camera]| {
-        Ok::<_, AuditError>(LightGroups::within(DEFAULT_BASIS_BYTES, lights, cameras, 2)?.is_merged())
+        Ok::<_, PrepError>(LightGroups::within(DEFAULT_BASIS_BYTES, lights, cameras, 2)?.is_merged())
     };
     let at_once = if merged(&cameras)? { 1 } else { cameras.len().max(1) };
     let groups = LightGroups::apart(lights);
@@ -98,7 +99,7 @@ pub(super) fn render_ours(
     let passes = cameras.len().div_ceil(at_once);
     for (pass, cameras) in cameras.chunks(at_once).enumerate() {
         if merged(cameras)? {
-            return Err(AuditError::TooManyLights { scene: id.clone(), lights, most_bytes: DEFAULT_BASIS_BYTES });
+            return Err(PrepError::TooManyLights { scene: id.clone(), lights, most_bytes: DEFAULT_BASIS_BYTES });
         }
         let step = format!("{id} ours");
         let shown = |done: usize, all: usize| progress(Report::step(&step, pass * all + done, passes * all));
@@ -122,7 +123,7 @@ pub(super) const PILOT: u32 = 8;
 const SHARE_OF_BOUND: f64 = 0.5;
 
 /// The largest number of samples that Blender has rendered any of the views with.
-pub(super) fn most_samples(views: &[TheirView]) -> Result<u32, AuditError> {
+pub(super) fn most_samples(views: &[TheirView]) -> Result<u32, PrepError> {
     let mut most = 1;
     for view in views {
         let render: RenderFile = json::read(&view.folder.join(RENDER_FILE))?;

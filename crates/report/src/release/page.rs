@@ -3,16 +3,16 @@
 //! Its first lines are numbers at a glance, what fails, and what was not given.
 
 use mateval_dataset::{Finding, Severity};
-use mateval_report::page_style::{SORT, STYLE};
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, context};
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use crate::file::ReleaseFile;
-use crate::gathered::rows;
-use crate::given::ReferenceScores;
-use crate::page_scene::{SHOWN_SCORES, ScenePage, cpu_seconds, duration, plural, worst_psnr};
+use super::file::ReleaseFile;
+use super::given::ReferenceScores;
+use super::page_scene::{SHOWN_SCORES, ScenePage, cpu_seconds, duration, plural, worst_psnr};
+use super::table_one::rows;
+use crate::page_style::{SORT, STYLE};
 
 const TEMPLATE: &str = include_str!("page.j2");
 
@@ -239,15 +239,19 @@ fn without_bound(name: &str, method: &str, scores: Option<&ReferenceScores>, all
 mod tests {
     use std::collections::BTreeMap;
 
-    use mateval_audit::compare::file::State;
-    use mateval_audit::stats::{CountedDataset, Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
     use mateval_dataset::scene_cost::{Step, StepCost};
     use mateval_dataset::{SceneId, SourceKind, ViewId};
     use mateval_eval::result::key::ResultKey;
+    use mateval_prep::compare::file::State;
+    use mateval_prep::stats::{CountedDataset, Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
 
-    use crate::file::{NOT_SHOWN, Publication, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, withhold};
-    use crate::gathered::{Evaluated, Remake, SceneInputs, ViewNoise};
-    use crate::given::{SceneVerdict, StateCount};
+    use super::super::file::{
+        NOT_SHOWN, Publication, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, withhold,
+    };
+    use super::super::given::{SceneVerdict, StateCount};
+    use super::super::remake::{Remake, SceneInputs};
+    use super::super::renders::ViewNoise;
+    use super::super::table_one::Evaluated;
 
     use super::*;
 
@@ -316,14 +320,14 @@ mod tests {
     }
 
     fn finding(at: usize, message: &str) -> Finding {
-        Finding {
-            severity: Severity::Error,
-            code: "bad".to_owned(),
-            file: format!("scenes/{}/views/input/depth.exr", id(at)),
-            place: "pixel 1.2345678".to_owned(),
-            message: message.to_owned(),
-            action: "make it again".to_owned(),
-        }
+        Finding::new(
+            Severity::Error,
+            "bad",
+            format!("scenes/{}/views/input/depth.exr", id(at)),
+            "pixel 1.2345678",
+            message,
+            "make it again",
+        )
     }
 
     fn counts() -> Counts {

@@ -13,7 +13,7 @@ use mateval_dataset::open::check_whole;
 use mateval_dataset::work_folder::{WorkFolder, check_holds_none};
 use mateval_dataset::{Progress, Report, SceneError, json};
 
-use crate::AuditError;
+use crate::error::ReportError;
 
 /// The result of publishing a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub struct Published {
 /// Writes the public files of the dataset in `root` to `public` and its ground truth to `private`; both are replaced
 /// where they exist. Fails before anything is written where a file differs from the manifest or there is no ground
 /// truth.
-pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_>) -> Result<Published, AuditError> {
+pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_>) -> Result<Published, ReportError> {
     let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
     check_whole(root, &dataset)?;
     [public, private].into_iter().try_for_each(|out| check_holds_none(out, &[root]))?;
@@ -41,7 +41,7 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     }
     let (withheld, shown) = split(root)?;
     if withheld.is_empty() {
-        return Err(AuditError::NoGroundTruth { path: root.to_owned() });
+        return Err(ReportError::NoGroundTruth { path: root.to_owned() });
     }
     let commitment_sha256 = commitment_of(&withheld);
     let mut shown: Vec<&str> = shown.iter().map(|entry| entry.file.as_str()).collect();
@@ -61,12 +61,12 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
 
 /// The commitment to the ground truth of the dataset in `root`, from its manifest alone:
 /// [`Published::commitment_sha256`].
-pub fn commitment(root: &Path) -> Result<String, AuditError> {
+pub fn commitment(root: &Path) -> Result<String, ReportError> {
     Ok(commitment_of(&split(root)?.0))
 }
 
 /// The manifest's files: the ground truth, then all others.
-fn split(root: &Path) -> Result<(Vec<Entry>, Vec<Entry>), AuditError> {
+fn split(root: &Path) -> Result<(Vec<Entry>, Vec<Entry>), ReportError> {
     Ok(manifest::entries(root)?.into_iter().partition(|entry| is_ground_truth(&entry.file)))
 }
 
@@ -75,14 +75,14 @@ fn commitment_of(withheld: &[Entry]) -> String {
     sha256_of_bytes(lines.as_bytes())
 }
 
-fn copy(from: &Path, to: &Path, files: &[&str], progress: &dyn Fn(usize)) -> Result<(), AuditError> {
+fn copy(from: &Path, to: &Path, files: &[&str], progress: &dyn Fn(usize)) -> Result<(), ReportError> {
     for (done, file) in files.iter().enumerate() {
         progress(done);
         let place = to.join(file);
         if let Some(folder) = place.parent() {
-            std::fs::create_dir_all(folder).map_err(AuditError::io("make", folder))?;
+            std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
         }
-        std::fs::copy(from.join(file), &place).map_err(AuditError::io("write", &place))?;
+        std::fs::copy(from.join(file), &place).map_err(SceneError::io("write", &place))?;
     }
     Ok(())
 }

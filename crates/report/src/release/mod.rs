@@ -5,36 +5,41 @@
 //! small pictures.
 //!
 //! [`CheckedRelease::new`] reads and checks everything that is given ([`given`]) before [`CheckedRelease::write`]
-//! verifies the dataset and gathers the rest ([`gathered`]): counts beside the paper's, the noise of the photo's
-//! renderer, licences and hashes of the inputs, commands, and pictures. [`mod@file`] holds what is written, with the
+//! verifies the dataset and gathers the rest: its counts beside the paper's ([`table_one`]), its pictures and their
+//! noise ([`renders`]), and what it takes to make it again ([`remake`]). [`mod@file`] holds what is written, with the
 //! citation; if the ground truth is withheld, it removes what was measured on it. `page` and `page_scene` fill the
 //! template.
 //!
 //! Nothing depends on a clock: the same inputs give the same bytes.
 
 pub mod file;
-pub mod gathered;
 pub mod given;
 mod page;
 mod page_scene;
+pub mod remake;
+pub mod renders;
+pub mod table_one;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_audit::publish::commitment;
-use mateval_audit::{stats, verify};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::work_folder::{WorkFolder, check_free, check_holds_none, is_inside};
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
 use mateval_image::store::write_whole;
+use mateval_prep::{stats, verify};
 
 pub use file::{Publication, ReleaseFile};
 use file::{RELEASE, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, bibtex, withhold};
-use gathered::{Evaluated, Remake, SceneInputs, licences, noise, rendered_with, without_licence, write_thumbnail};
-pub use given::ReleaseError;
 use given::{Bounds, SceneVerdict, read_bounds, read_comparisons};
 use page::page;
+use remake::{Remake, SceneInputs, licences, without_licence};
+use renders::{noise, rendered_with, write_thumbnail};
+use table_one::Evaluated;
+
+use crate::error::ReportError;
+use crate::publish::commitment;
 
 /// What to describe, and where to write the report.
 #[derive(Clone, Debug, Default)]
@@ -69,7 +74,7 @@ pub struct CheckedRelease<'a> {
 impl<'a> CheckedRelease<'a> {
     /// Checks everything that can fail early: the report's place, that the dataset is whole, and all files that are
     /// given.
-    pub fn new(options: &'a ReleaseOptions) -> Result<Self, ReleaseError> {
+    pub fn new(options: &'a ReleaseOptions) -> Result<Self, ReportError> {
         let dataset = Dataset::open(&options.dataset)?;
         dataset.check_whole()?;
         check_place(options)?;
@@ -78,9 +83,9 @@ impl<'a> CheckedRelease<'a> {
         let comparisons = read_comparisons(&options.verdicts, &dataset);
         let bounds = read_bounds(ceiling, floor, &options.protocol, &dataset);
         match (comparisons, bounds) {
-            (Err(ReleaseError::UnfitFiles(mut all)), Err(ReleaseError::UnfitFiles(others))) => {
+            (Err(ReportError::UnfitForRelease(mut all)), Err(ReportError::UnfitForRelease(others))) => {
                 all.extend(others);
-                Err(ReleaseError::UnfitFiles(all))
+                Err(ReportError::UnfitForRelease(all))
             }
             (comparisons, bounds) => Ok(Self { options, dataset, comparisons: comparisons?, bounds: bounds? }),
         }
@@ -88,7 +93,7 @@ impl<'a> CheckedRelease<'a> {
 
     /// Verifies the dataset and writes the report, completely or not at all. `tool` is the name and version that it
     /// records.
-    pub fn write(&self, tool: &str, progress: Progress<'_>) -> Result<ReleaseFile, ReleaseError> {
+    pub fn write(&self, tool: &str, progress: Progress<'_>) -> Result<ReleaseFile, ReportError> {
         let findings = verify::verify(&self.options.dataset, progress)?;
         // The caller may have written folders since.
         check_place(self.options)?;
@@ -106,7 +111,7 @@ impl<'a> CheckedRelease<'a> {
         findings: Vec<Finding>,
         out: &Path,
         progress: Progress<'_>,
-    ) -> Result<ReleaseFile, ReleaseError> {
+    ) -> Result<ReleaseFile, ReportError> {
         let dataset = &self.dataset;
         let rendered = rendered_with(dataset)?;
         let sound = findings.iter().all(|finding| finding.severity != Severity::Error);
@@ -144,7 +149,7 @@ impl<'a> CheckedRelease<'a> {
         Ok(file)
     }
 
-    fn scene(&self, scene: &SceneFile, out: &Path) -> Result<ReleasedScene, ReleaseError> {
+    fn scene(&self, scene: &SceneFile, out: &Path) -> Result<ReleasedScene, ReportError> {
         Ok(ReleasedScene {
             scene: scene.id.clone(),
             photo: scene.photo.is_some(),
@@ -164,10 +169,10 @@ impl<'a> CheckedRelease<'a> {
 }
 
 /// Fails where the report would lie in the dataset, replace an input, or replace anything but a report.
-fn check_place(options: &ReleaseOptions) -> Result<(), ReleaseError> {
+fn check_place(options: &ReleaseOptions) -> Result<(), ReportError> {
     let out = &options.out;
     if is_inside(out, &options.dataset) {
-        return Err(ReleaseError::OutputInDataset { path: out.clone() });
+        return Err(ReportError::OutputInDataset { path: out.clone() });
     }
     let files = options.verdicts.iter().chain(&options.ceiling).chain(&options.floor);
     let inputs: Vec<&Path> = std::iter::once(&options.dataset).chain(files).map(PathBuf::as_path).collect();
@@ -176,7 +181,7 @@ fn check_place(options: &ReleaseOptions) -> Result<(), ReleaseError> {
         return Ok(());
     }
     if !out.join(RELEASE).is_file() {
-        return Err(ReleaseError::NotAReport { path: out.clone() });
+        return Err(ReportError::NotAReport { path: out.clone() });
     }
     Ok(check_free(out, options.force, "--report")?)
 }

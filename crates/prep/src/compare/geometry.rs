@@ -1,15 +1,15 @@
 //! Compares the pictures without light: base colours, ids, depths, normals.
 
+use crate::views::base_color_at_centres;
 use mateval_dataset::dataset::View;
 use mateval_dataset::layout::SceneFolder;
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_metrics::{Psnr, mse};
-use mateval_prep::views::base_color_at_centres;
 use mateval_tracer::World;
 
 use super::file::{BASE_COLOR_PSNR_DB, Check, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG, Quantity, State};
-use super::light::median;
 use super::pictures::TheirView;
+use super::tiles::median;
 
 /// The dataset's own pictures of a view.
 pub(super) struct OurGeometry {
@@ -180,4 +180,16 @@ fn check(
         None => State::Undecided,
     };
     Check { picture: picture.to_owned(), quantity, state, measured, bound: Some(bound), count, message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles() {
+        let angle = |a, b| angle_deg(Normal(a), Normal(b));
+        assert!((angle([1.0, 0.0, 0.0], [1.0, 1.0, 0.0]) - 45.0).abs() < 1e-9);
+        assert_eq!(angle([1.0, 0.0, 0.0], [0.0; 3]), 180.0);
+    }
 }

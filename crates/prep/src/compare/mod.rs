@@ -1,22 +1,26 @@
 //! Compares Blender's pictures of a dataset with those of the built-in tracer, view by view.
 //!
-//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`report`] prints as tables; its verdict, which is
-//! kept in the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
+//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`mod@tables`] prints; its verdict, which is kept
+//! in the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
 //!
 //! Between: `pictures` reads Blender's pictures and renders ours; `geometry` compares pictures without light, and
-//! `light` compares pictures of light tile by tile. [`mod@file`] states which materials may differ and how far.
-//! Converted materials are compared with the source's own by the built-in tracer's pictures of both.
+//! `light` compares pictures of light tile by tile, with the statistics of `tiles`. [`mod@file`] states which materials
+//! may differ and how far. Converted materials are compared with the source's own by the built-in tracer's pictures of
+//! both.
 
 pub mod file;
 mod geometry;
 mod light;
+mod page;
 mod pictures;
-pub mod report;
+pub mod tables;
+mod tiles;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::render::RendererKind;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{BuildFolder, COMPARE, SceneFolder};
 use mateval_dataset::open::Dataset;
@@ -28,7 +32,6 @@ use mateval_dataset::work_folder::{WorkFolder, check_free, is_inside};
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Psnr;
-use mateval_prep::render::RendererKind;
 use mateval_tracer::World;
 
 use self::file::{
@@ -36,10 +39,11 @@ use self::file::{
     SceneComparison, SourceComparison, State, ViewComparison, file_check,
 };
 use self::geometry::{OurGeometry, TheirGeometry};
-use self::light::{Halves, ShownKinds};
+use self::light::ShownKinds;
+use self::page::ViewPreviews;
 use self::pictures::{OurLight, PILOT, TheirView};
-use self::report::ViewPreviews;
-use crate::AuditError;
+use self::tiles::Halves;
+use crate::error::PrepError;
 
 /// What to compare, and where to write the page.
 #[derive(Clone, Debug, Default)]
@@ -59,7 +63,7 @@ pub struct CompareOptions {
 /// Compares the pictures of the dataset's scenes, and writes the outcomes to the dataset's `compare.json`. Scenes with
 /// a photo from elsewhere are left out. A view that Blender has not rendered is reported as `missing`; fails where that
 /// is every view of the others.
-pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
+pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, PrepError> {
     let dataset = Dataset::open(&options.dataset)?;
     let mut scenes = dataset.chosen_scenes(&options.scenes)?;
     if let Some(absence) = dataset.absence().filter(|_| options.scenes.is_empty()) {
@@ -102,14 +106,14 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     }
     if let Some(work) = work {
         json::write(&work.path().join(COMPARE), &file)?;
-        mateval_image::store::write_whole(&work.path().join("index.html"), report::page(&file, &previews).as_bytes())?;
+        mateval_image::store::write_whole(&work.path().join("index.html"), page::page(&file, &previews).as_bytes())?;
         work.finish()?;
     }
     Ok(file)
 }
 
 /// The outcomes by scene, as the dataset's `compare.json` holds them.
-fn verdict(file: &CompareFile) -> render_file::CompareFile {
+fn verdict(file: &CompareFile) -> render_file::VerdictFile {
     let mut scenes: BTreeMap<SceneId, CompareCounts> = BTreeMap::new();
     for (scene, _, check) in file.checks() {
         let counts = scenes.entry(scene.clone()).or_default();
@@ -119,7 +123,7 @@ fn verdict(file: &CompareFile) -> render_file::CompareFile {
             State::TooNoisy | State::Undecided => counts.too_noisy += 1,
         }
     }
-    render_file::CompareFile {
+    render_file::VerdictFile {
         format: VERDICT_FORMAT.to_owned(),
         tool: file.tool.clone(),
         manifest_sha256: file.dataset.manifest_sha256.clone(),
@@ -137,21 +141,24 @@ fn rendered(folder: &SceneFolder, view: &View) -> Option<PathBuf> {
 }
 
 /// Fails where there are scenes and Blender has rendered no view of any.
-fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), AuditError> {
+fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), PrepError> {
     let has_any =
         |scene: &&&SceneFile| scene.views.iter().any(|view| rendered(&dataset.folder(&scene.id), view).is_some());
     if scenes.is_empty() || scenes.iter().any(|scene| has_any(&scene)) {
         return Ok(());
     }
     let scenes = scenes.iter().map(|scene| scene.id.clone()).collect();
-    Err(AuditError::NotRendered { path: dataset.root.clone(), renderer: COMPARED, scenes })
+    Err(PrepError::NotRendered { path: dataset.root.clone(), renderer: COMPARED, scenes })
 }
 
 /// Fails where the output would lie in the dataset, or exists and may not be replaced.
-fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
+fn check_out(options: &CompareOptions) -> Result<(), PrepError> {
     let Some(out) = &options.out else { return Ok(()) };
     if is_inside(out, &options.dataset) {
-        return Err(AuditError::OutputInDataset { path: out.clone() });
+        return Err(PrepError::unusable(
+            out,
+            "would lie in the dataset, whose manifest does not list it; choose another --out",
+        ));
     }
     if !out.exists() {
         return Ok(());
@@ -159,7 +166,9 @@ fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
     check_free(out, options.force, "--out")?;
     match json::read_format::<CompareFile>(&out.join(COMPARE), COMPARE_FORMAT).is_ok() {
         true => Ok(()),
-        false => Err(AuditError::NotAComparison { path: out.clone() }),
+        false => {
+            Err(PrepError::unusable(out, "exists and is not a comparison; it is not replaced: choose another --out"))
+        }
     }
 }
 
@@ -170,7 +179,7 @@ fn compare_scene(
     samples: Option<u32>,
     out: Option<&Path>,
     progress: Progress<'_>,
-) -> Result<(SceneComparison, Vec<ViewPreviews>), AuditError> {
+) -> Result<(SceneComparison, Vec<ViewPreviews>), PrepError> {
     let reference = Arc::new(reference::read(folder)?);
     let world = World::new(reference.clone())?;
     let kinds = MaterialKind::of_surfaces(&reference);
@@ -250,7 +259,7 @@ struct Pilot<'a> {
 
 impl Pilot<'_> {
     /// The number of samples for all views, at most as many as Blender's.
-    fn samples(&self, views: &[&View], progress: Progress<'_>) -> Result<u32, AuditError> {
+    fn samples(&self, views: &[&View], progress: Progress<'_>) -> Result<u32, PrepError> {
         let their_views: Vec<TheirView> = views.iter().filter_map(|view| their_view(self.folder, view)).collect();
         let most = pictures::most_samples(&their_views)?;
         if most <= PILOT {
@@ -288,11 +297,11 @@ impl ViewPair<'_> {
         light: &OurLight,
         theirs: &TheirView,
         out: Option<(&Path, &SceneFile)>,
-    ) -> Result<(ViewComparison, Option<ViewPreviews>), AuditError> {
+    ) -> Result<(ViewComparison, Option<ViewPreviews>), PrepError> {
         let ours = OurGeometry::read(self.folder, self.view, self.world)?;
         if !ours.has_size(theirs.size) {
             let (width, height) = theirs.size;
-            return Err(AuditError::WrongSize { path: self.folder.view(&self.view.id), expected: [width, height] });
+            return Err(PrepError::ViewSize { path: self.folder.view(&self.view.id), expected: [width, height] });
         }
         let mut found = ViewComparison { view: self.view.id.clone(), checks: Vec::new(), light: Vec::new() };
         let their_geometry = TheirGeometry::read(theirs, &mut found.checks);
@@ -373,7 +382,7 @@ struct Converted<'a> {
 
 impl Converted<'_> {
     /// Renders the view with the source's own materials and compares; absent if the materials were not converted.
-    fn compare(&self, samples: u32, progress: Progress<'_>) -> Result<Option<SourceComparison>, AuditError> {
+    fn compare(&self, samples: u32, progress: Progress<'_>) -> Result<Option<SourceComparison>, PrepError> {
         let reference = self.world.scene();
         let Some(source) = reference::read_source_materials(self.folder, reference.materials.len())? else {
             return Ok(None);

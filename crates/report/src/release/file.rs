@@ -8,15 +8,17 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use mateval_audit::stats::StatsFile;
 use mateval_dataset::dataset::DatasetFile;
 use mateval_dataset::scene_cost::StepCost;
 use mateval_dataset::{Finding, RendererId, SceneId, Severity};
+use mateval_prep::stats::StatsFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::gathered::{Evaluated, Remake, RenderedWith, SceneInputs, SharedLicence, Thumbnail, ViewNoise};
-use crate::given::{ReferenceScores, SceneVerdict};
+use super::given::{ReferenceScores, SceneVerdict};
+use super::remake::{Remake, SceneInputs, SharedLicence};
+use super::renders::{RenderedWith, Thumbnail, ViewNoise};
+use super::table_one::Evaluated;
 
 /// The format of this version of the file.
 pub const RELEASE_FORMAT: &str = "mateval-release/1";

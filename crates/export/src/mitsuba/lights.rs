@@ -11,8 +11,8 @@ use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, Surface, 
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, Texture};
 
-use super::files::{Element, Remarks};
 use super::materials::radiance_map;
+use super::xml::{Element, Remarks};
 
 /// The emission of a surface.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,51 +6,17 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_audit::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, State};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
 use mateval_eval::EvalError;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_prep::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Why a release could not be described.
-#[derive(Debug, thiserror::Error)]
-pub enum ReleaseError {
-    /// Files that were given are not about this dataset, or are something else: every reason. Correct them, or leave
-    /// them out.
-    #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
-    UnfitFiles(Vec<Finding>),
-    #[error(
-        "'{}' holds no .json file; expected what `mateval prep compare --out` or `--format json` writes, in the folder \
-         or directly below it",
-        folder.display()
-    )]
-    NoVerdicts { folder: PathBuf },
-    /// A folder that is not the report of a release would be replaced: choose another one.
-    #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
-    NotAReport { path: PathBuf },
-    /// The report would lie in the dataset: choose another place.
-    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
-    OutputInDataset { path: PathBuf },
-    /// The dataset, or a file of it, could not be read or written.
-    #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
-    /// The dataset could not be examined.
-    #[error(transparent)]
-    Audit(#[from] mateval_audit::AuditError),
-    /// A result could not be checked.
-    #[error(transparent)]
-    Eval(#[from] mateval_eval::EvalError),
-    /// The recipe could not be read.
-    #[error(transparent)]
-    Prep(#[from] mateval_prep::PrepError),
-    /// A picture could not be read or written.
-    #[error(transparent)]
-    Image(#[from] mateval_image::ImageError),
-}
+use crate::error::ReportError;
 
 /// All states, in the order in which they are counted.
 const STATES: [State; 6] =
@@ -107,7 +73,7 @@ fn agrees(scene: &SceneComparison) -> bool {
 /// Reads verdicts from files, and from the `.json` files of folders and of the folders directly below. Fails with every
 /// reason for which one of them does not fit: it is something else, is about another dataset or a part of a scene, or
 /// repeats a scene.
-pub fn read_comparisons(paths: &[PathBuf], dataset: &Dataset) -> Result<BTreeMap<SceneId, SceneVerdict>, ReleaseError> {
+pub fn read_comparisons(paths: &[PathBuf], dataset: &Dataset) -> Result<BTreeMap<SceneId, SceneVerdict>, ReportError> {
     let mut findings = Vec::new();
     let mut verdicts: BTreeMap<SceneId, (PathBuf, SceneVerdict)> = BTreeMap::new();
     for path in json_files(paths)? {
@@ -128,7 +94,7 @@ pub fn read_comparisons(paths: &[PathBuf], dataset: &Dataset) -> Result<BTreeMap
         }
     }
     if !findings.is_empty() {
-        return Err(ReleaseError::UnfitFiles(findings));
+        return Err(ReportError::UnfitForRelease(findings));
     }
     Ok(verdicts.into_iter().map(|(scene, (_, verdict))| (scene, verdict)).collect())
 }
@@ -153,7 +119,7 @@ fn incomplete(path: &Path, at: usize, found: &SceneComparison, dataset: &Dataset
 }
 
 /// The files, sorted within each folder.
-fn json_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReleaseError> {
+fn json_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReportError> {
     let mut all = Vec::new();
     for path in paths {
         if !path.is_dir() {
@@ -168,7 +134,7 @@ fn json_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReleaseError> {
             }
         }
         if found.is_empty() {
-            return Err(ReleaseError::NoVerdicts { folder: path.clone() });
+            return Err(ReportError::NoVerdicts { folder: path.clone() });
         }
         all.extend(found);
     }
@@ -256,7 +222,7 @@ pub fn read_bounds(
     floor: Option<&Path>,
     protocol: &str,
     dataset: &Dataset,
-) -> Result<Bounds, ReleaseError> {
+) -> Result<Bounds, ReportError> {
     let mut findings = Vec::new();
     let [first, second] = [ceiling, floor].map(|path| path.map(|path| result(path, protocol, dataset, &mut findings)));
     let (first, second) = (first.transpose()?.flatten(), second.transpose()?.flatten());
@@ -267,7 +233,7 @@ pub fn read_bounds(
         findings.push(unfit(path, &format!("/protocols/{protocol}/fingerprint"), message));
     }
     if !findings.is_empty() {
-        return Err(ReleaseError::UnfitFiles(findings));
+        return Err(ReportError::UnfitForRelease(findings));
     }
     let scores = |read: Option<Scored>| read.map(|(result, scores)| ReferenceScores::new(&result, &scores));
     Ok(Bounds { ceiling: scores(first), floor: scores(second) })
@@ -281,7 +247,7 @@ fn result(
     protocol: &str,
     dataset: &Dataset,
     findings: &mut Vec<Finding>,
-) -> Result<Option<Scored>, ReleaseError> {
+) -> Result<Option<Scored>, ReportError> {
     let read = match ResultFile::read(path) {
         Ok(result) => Ok(result),
         Err(EvalError::Dataset(error)) => Err(error),
@@ -339,14 +305,7 @@ const ACTION: &str = "make it again from this dataset, or leave it out";
 
 /// A finding about the place, a JSON pointer, of a file.
 fn unfit(path: &Path, place: &str, message: String) -> Finding {
-    Finding {
-        severity: Severity::Error,
-        code: "unfit_file".to_owned(),
-        file: path.display().to_string(),
-        place: place.to_owned(),
-        message,
-        action: ACTION.to_owned(),
-    }
+    Finding::new(Severity::Error, "unfit_file", path.display().to_string(), place, message, ACTION)
 }
 
 /// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends

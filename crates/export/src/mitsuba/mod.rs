@@ -4,74 +4,54 @@
 //! `scene.xml` (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that
 //! Mitsuba cannot express. The scene contains the nearest that it can.
 //!
-//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights; `files`
-//! writes XML and meshes. Names of the source appear in comments of the XML only, so that no name can become a path or
-//! markup.
+//! Between: this file converts the camera, `materials` materials and their textures, and `lights` lights; `xml` writes
+//! the document, and `ply` meshes. Names of the source appear in comments of the XML only, so that no name can become a
+//! path or markup.
 
-mod files;
 mod lights;
 mod materials;
+mod ply;
+mod xml;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::DVec3;
-use mateval_dataset::dataset::View;
 use mateval_dataset::material::Material;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::{ReferenceScene, Surface};
-use mateval_dataset::work_folder::{WorkFolder, check_free};
+use mateval_dataset::work_folder::WorkFolder;
 use mateval_dataset::{Camera, Finding, SceneId, ViewId, reference};
 use mateval_image::Texture;
 use mateval_image::store::write_whole;
-use mateval_prep::recipe::{self, RECIPE};
 use mateval_tracer::RenderSettings;
 
-use self::files::{Element, Remarks, SCENE_FILE, Sheet};
 use self::lights::Glow;
 use self::materials::TextureFiles;
-use crate::AuditError;
+use self::ply::Sheet;
+use self::xml::{Element, Remarks, SCENE_FILE};
+use crate::dataset::ExportError;
 
 /// Distance of the second sheet of a lamp that emits on both sides behind the first, as a share of the mesh's extent.
 const SHEET_DISTANCE: f32 = 1e-4;
 
-/// The view of a dataset to export.
-#[derive(Clone, Debug)]
-pub struct ExportOptions {
-    /// The dataset's folder, which must contain the ground truth.
-    pub dataset: PathBuf,
-    pub scene: SceneId,
-    pub view: ViewId,
-    /// Samples per pixel; the recipe's number where absent.
-    pub samples: Option<u32>,
-    pub out: PathBuf,
-    /// Replace a folder that already exists.
-    pub force: bool,
-}
-
-/// Writes a view of a dataset. Returns the findings of [`export`].
+/// Writes a view of a dataset, which must contain the ground truth, to the folder `out`. Returns the findings of
+/// [`export`].
 ///
-/// Fails where the dataset, the scene or the view does not exist, or the output does.
-pub fn export_view(options: &ExportOptions) -> Result<Vec<Finding>, AuditError> {
-    check_free(&options.out, options.force, "folder")?;
-    let dataset = Dataset::open(&options.dataset)?;
-    let view = find_view(&dataset, options)?;
-    let samples = match options.samples {
-        Some(samples) => samples,
-        None => recipe::read(&options.dataset.join(RECIPE))?.0.samples,
-    };
+/// Fails where the scene or the view does not exist.
+pub fn export_view(
+    dataset: &Dataset,
+    scene: &SceneId,
+    view: &ViewId,
+    samples: u32,
+    out: &Path,
+) -> Result<Vec<Finding>, ExportError> {
+    let found = dataset.scene(scene)?.views.iter().find(|known| known.id == *view);
+    let no_view = || ExportError::NoView { path: dataset.root.clone(), scene: scene.clone(), view: view.clone() };
+    let camera = found.ok_or_else(no_view)?.camera;
     let concerns = |path: &str| path.starts_with("ground_truth/reference/") || path == "ground_truth/lights.json";
-    dataset.check_files(&options.scene, concerns)?;
-    let scene = reference::read(&dataset.folder(&options.scene))?;
-    export(&scene, &view.camera, &RenderSettings { samples, ..Default::default() }, &options.out)
-}
-
-fn find_view<'d>(dataset: &'d Dataset, options: &ExportOptions) -> Result<&'d View, AuditError> {
-    let view = dataset.scene(&options.scene)?.views.iter().find(|view| view.id == options.view);
-    view.ok_or_else(|| AuditError::NoView {
-        path: options.dataset.clone(),
-        scene: options.scene.clone(),
-        view: options.view.clone(),
-    })
+    dataset.check_files(scene, concerns)?;
+    let scene = reference::read(&dataset.folder(scene))?;
+    export(&scene, &camera, &RenderSettings { samples, ..Default::default() }, out)
 }
 
 /// Writes the scene to the folder `out`, replacing one that exists. After a failure no partial folder is left.
@@ -83,7 +63,7 @@ pub fn export(
     camera: &Camera,
     settings: &RenderSettings,
     out: &Path,
-) -> Result<Vec<Finding>, AuditError> {
+) -> Result<Vec<Finding>, ExportError> {
     let work = WorkFolder::start(out)?;
     let mut remarks = Remarks::default();
     let document = write_scene(scene, camera, settings, work.path(), &mut remarks)?;
@@ -98,10 +78,10 @@ fn write_scene(
     settings: &RenderSettings,
     folder: &Path,
     remarks: &mut Remarks,
-) -> Result<Element, AuditError> {
+) -> Result<Element, ExportError> {
     for name in ["meshes", "textures"] {
         let path = folder.join(name);
-        std::fs::create_dir(&path).map_err(AuditError::io("make", &path))?;
+        std::fs::create_dir(&path).map_err(ExportError::io("make", &path))?;
     }
     let textures = scene.texture_list();
     let mut document = Element::new("scene")
@@ -130,7 +110,7 @@ fn write_materials(
     folder: &Path,
     textures: &[Texture],
     remarks: &mut Remarks,
-) -> Result<Vec<Element>, AuditError> {
+) -> Result<Vec<Element>, ExportError> {
     let mut files = TextureFiles::new(folder, textures);
     let used = |index: &usize| scene.surfaces.iter().any(|surface| surface.material.0 == *index);
     let mut write = |index: usize| {
@@ -153,12 +133,12 @@ fn write_surface(
     surface: &Surface,
     glow: Option<&Glow>,
     remarks: &mut Remarks,
-) -> Result<Vec<Element>, AuditError> {
+) -> Result<Vec<Element>, ExportError> {
     if surface.mesh.triangles.is_empty() {
         return Ok(Vec::new());
     }
     let place = format!("surface {index} '{}'", surface.name);
-    let bent = files::bent_triangles(&surface.mesh);
+    let bent = ply::bent_triangles(&surface.mesh);
     if bent > 0 && glow.is_none() {
         let message = format!("{bent} triangles have a vertex normal behind their front");
         remarks.note(
@@ -182,7 +162,7 @@ fn write_surface(
     }
     let mut shapes = Vec::new();
     for (file, sheet) in sheets {
-        let (bytes, normals) = files::ply_bytes(&surface.mesh, sheet);
+        let (bytes, normals) = ply::ply_bytes(&surface.mesh, sheet);
         write_whole(&folder.join(&file), &bytes)?;
         let shape = Element::plugin("shape", "ply")
             .remark(&surface.name)

@@ -11,7 +11,7 @@ use mateval_dataset::material::{
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap, png_io};
 
-use super::files::{Element, Remarks};
+use super::xml::{Element, Remarks};
 
 /// The material as a plugin. `remarks` receives what Mitsuba cannot express.
 pub(super) fn bsdf(

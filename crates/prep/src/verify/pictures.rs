@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use crate::scene_meshes::Faults;
+use crate::scene_meshes::Meshes;
+use crate::views::{SeenTriangle, ViewPixel, ViewScene};
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{INPUT, SceneFolder, part_picture};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
-use mateval_prep::scene_meshes::Faults;
-use mateval_prep::scene_meshes::Meshes;
-use mateval_prep::views::{SeenTriangle, ViewPixel, ViewScene};
 use mateval_tracer::World;
 use rayon::prelude::*;
 

@@ -7,6 +7,8 @@ mod scene;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::scene_meshes;
+use crate::scene_meshes::Faults;
 use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::BuildFolder;
@@ -14,32 +16,33 @@ use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::open::{absent_scenes, is_below};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
-use mateval_prep::scene_meshes;
-use mateval_prep::scene_meshes::Faults;
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
 
 use self::scene::{check_scene_file, check_schema};
-use crate::AuditError;
+use crate::error::PrepError;
 
 /// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound
 /// dataset has no finding of severity `error`. Fails where the folder contains no dataset.
-pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, AuditError> {
+pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepError> {
     let dataset_path = root.join(DATASET);
     if !dataset_path.is_file() {
-        return Err(AuditError::NotADataset { path: root.to_owned() });
+        return Err(PrepError::unusable(
+            root,
+            "has no dataset.json: it is not a dataset, or its build did not finish and `prep build` must be run again",
+        ));
     }
     let mut faults = Faults::default();
     progress(Report::step("hashes", 0, 1));
     for scene in BuildFolder::of(root).changed() {
-        faults.all.push(Finding {
-            severity: Severity::Error,
-            code: "unfinished".to_owned(),
-            file: format!("scenes/{scene}"),
-            place: String::new(),
-            message: "the scene was made or rendered apart since the manifest was written".to_owned(),
-            action: "run `mateval prep finish`".to_owned(),
-        });
+        faults.all.push(Finding::new(
+            Severity::Error,
+            "unfinished",
+            format!("scenes/{scene}"),
+            "",
+            "the scene was made or rendered apart since the manifest was written",
+            "run `mateval prep finish`",
+        ));
     }
     check_schema::<DatasetFile>(root, DATASET, &mut faults);
     check_schema::<TargetsFile>(root, TARGETS, &mut faults);
@@ -85,14 +88,14 @@ fn check_manifest(root: &Path, absent: &[SceneId], faults: &mut Faults) {
 
 /// A dataset may be used scene by scene, so that absent scenes are no fault; but nothing was checked of them.
 fn absence(absent: &[SceneId], total: usize) -> Finding {
-    Finding {
-        severity: Severity::Warning,
-        code: "absent_scenes".to_owned(),
-        file: DATASET.to_owned(),
-        place: "/scenes".to_owned(),
-        message: format!("{} of {total} scenes have no folder here: {}", absent.len(), quoted(absent)),
-        action: "they were not checked".to_owned(),
-    }
+    Finding::new(
+        Severity::Warning,
+        "absent_scenes",
+        DATASET,
+        "/scenes",
+        format!("{} of {total} scenes have no folder here: {}", absent.len(), quoted(absent)),
+        "they were not checked",
+    )
 }
 
 /// Whether a file is missing because the whole ground truth of its scene is withheld, which is not a fault.
