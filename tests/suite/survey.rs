@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
 
-use mateval_dataset::lease::Lease;
+use mateval_files::lease::Lease;
 use serde_json::{Value, json};
 
 use super::command::{Run, mateval, run};

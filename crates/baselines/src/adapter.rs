@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::submission::Map;
 use mateval_dataset::submission::StoredEncoding;
+use mateval_files::FileError;
 use mateval_image::texture_io::read_texture;
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
 use serde::Deserialize;
@@ -61,7 +62,7 @@ impl Adapter {
             return Err(BaselineError::NoAdapter { name: name.to_owned(), known: Self::names().join(", ") });
         }
         let text = std::fs::read_to_string(path);
-        let text = text.map_err(|source| BaselineError::Io { action: "read", path: path.to_owned(), source })?;
+        let text = text.map_err(FileError::io("read", path))?;
         Self::parse(&text, path)
     }
 

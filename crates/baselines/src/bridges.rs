@@ -16,10 +16,11 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3};
 use mateval_dataset::dataset::Instance;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::WorkFolder;
-use mateval_dataset::{Progress, Report, SceneError, SceneId, TriangleMesh};
+use mateval_dataset::{Progress, Report, SceneId, TriangleMesh};
+use mateval_files::FileError;
+use mateval_files::whole::write_whole;
+use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_linear};
-use mateval_image::store::write_whole;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, png_io};
 use serde_json::json;
@@ -98,7 +99,7 @@ pub fn export_texgen(
             }
             let id = object_id(&scene.id, instance);
             let folder = work.path().join(object_folder(&id));
-            std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+            std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
             write_object(&folder, geometry.mesh(at), &known)?;
             png_io::write_rgb_bytes(&folder.join("picture.png"), &picture(&seen, &estimate, at))?;
             let prompt = instance.category.as_deref().unwrap_or(&instance.name);
@@ -267,7 +268,7 @@ pub fn import_partfield(dataset: &Dataset, clusters: &Path, parts: u8, out: &Pat
     let mut count = 0;
     for scene in &dataset.scenes {
         let folder = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
         for instance in &scene.instances {
             let Some(path) = labels_of(clusters, &scene.id, instance, parts) else { continue };
             let bytes = checked_labels(&path, instance)?;
@@ -291,7 +292,7 @@ fn labels_of(clusters: &Path, scene: &SceneId, instance: &Instance, parts: u8) -
 /// The file's bytes, if it holds one label per triangle.
 fn checked_labels(path: &Path, instance: &Instance) -> Result<Vec<u8>, BaselineError> {
     let bad = |source: LabelsError| BaselineError::BadLabels { path: path.to_owned(), source };
-    let bytes = mateval_image::limits::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.into()))?;
+    let bytes = mateval_files::untrusted::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.into()))?;
     let file = npyz::NpyFile::new(bytes.as_slice()).map_err(|error| bad(error.into()))?;
     let labels: u64 = file.shape().iter().try_fold(1_u64, |all, axis| all.checked_mul(*axis)).unwrap_or(u64::MAX);
     if labels != instance.triangles as u64 {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mateval_files::FileError;
 use mateval_procedural::ProceduralError;
 
 use crate::import::error::ImportError;
@@ -9,13 +10,8 @@ use crate::import::error::ImportError;
 /// Why a baseline could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BaselineError {
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// The operation, such as `read` or `write`.
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// The output exists and is never replaced.
     #[error("'{}' already exists; choose another --out", .0.display())]
     InTheWay(PathBuf),

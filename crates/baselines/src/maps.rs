@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_dataset::SceneError;
 use mateval_dataset::mesh::UvAtlas;
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
+use mateval_files::FileError;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, png_io};
 
@@ -66,7 +66,7 @@ impl Maps {
 
     /// Writes the maps to the instance's folder, which is created.
     pub fn write(&self, folder: &Path) -> Result<(), BaselineError> {
-        std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         let path = |map: Map| folder.join(map.stem()).with_extension("png");
         if let Some(picture) = &self.base_color {
             png_io::write_rgb_bytes(&path(Map::BaseColor), picture)?;

@@ -9,8 +9,9 @@ use mateval_dataset::layout::is_rendered;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::StoredEncoding;
 use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
-use mateval_dataset::work_folder::{WorkFolder, check_free, is_inside};
-use mateval_dataset::{Progress, Report, SceneError, json};
+use mateval_dataset::{Progress, Report, json};
+use mateval_files::FileError;
+use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
 
 use crate::error::BaselineError;
 
@@ -46,7 +47,7 @@ pub fn write(
         let mut instances = 0;
         for instance in scene.instances.iter().filter(|instance| instance.atlas.is_some()) {
             let folder = folder.join(instance.id.as_str());
-            std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+            std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
             write_instance(scene, instance, &folder)?;
             instances += 1;
         }
@@ -75,7 +76,7 @@ pub fn write_scenes(
         let concerns = |path: &str| !is_rendered(path) && (has_truth || !path.starts_with("ground_truth/"));
         dataset.check_files(&scene.id, concerns)?;
         let folder = scene_folder(work.path(), &scene.id);
-        std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
         instances += write_scene(scene, &folder)?;
     }
     let file = SubmissionFile {
@@ -133,7 +134,7 @@ pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, 
             let name = Path::new(map.stem()).with_extension("png");
             let (from, to) = (truth.join(&name), folder.join(&name));
             let copied = std::fs::copy(&from, &to);
-            copied.map_err(|source| BaselineError::Io { action: "copy", path: from, source })?;
+            copied.map_err(FileError::io("copy", from))?;
         }
         Ok(())
     })

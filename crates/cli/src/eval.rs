@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::is_inside;
 use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
+use mateval_files::work_folder::is_inside;
 use mateval_metrics::{Lpips, Net};
 use mateval_report::pair::{PairValues, compare};
 use mateval_submission::SubmissionError;

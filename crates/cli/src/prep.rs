@@ -7,9 +7,9 @@ mod publish;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_dataset::work_folder::is_inside;
 use mateval_dataset::{SceneId, Severity, json};
-use mateval_image::store::write_whole;
+use mateval_files::whole::write_whole;
+use mateval_files::work_folder::is_inside;
 use mateval_prep::compare::{CompareOptions, compare, tables};
 use mateval_prep::stats;
 use mateval_prep::verify::verify;

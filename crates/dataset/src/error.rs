@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use mateval_image::store::Owner;
+use mateval_files::FileError;
 
 use crate::dataset::{FORMAT, PREVIOUS_FORMAT};
 use crate::findings::Finding;
@@ -11,40 +11,12 @@ use crate::ids::{SceneId, quoted};
 /// Why a dataset or a part of it could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// What was attempted, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
     /// The path is not the folder of a finished dataset.
     #[error("'{}' is not a dataset: {reason}", path.display())]
     NotADataset {
         path: PathBuf,
         /// What was found, and what to do.
         reason: String,
-    },
-    /// A folder that did not exist when work on it began exists now.
-    #[error("'{}' was made by another process meanwhile; it stays as it is, and this run's result is removed", path.display())]
-    MadeMeanwhile { path: PathBuf },
-    /// An output that may be replaced holds an input.
-    #[error("'{}' holds '{}', which would be deleted with it; choose another output", path.display(), input.display())]
-    HoldsInput { path: PathBuf, input: PathBuf },
-    /// Another process works on the same scene or dataset.
-    #[error(
-        "process {} on {} is at work on {what}, and gave its last sign of life {} seconds ago; wait for it, or, if it is \
-         gone, remove '{}'",
-        holder.process, holder.host, silence.as_secs(), path.display()
-    )]
-    InUse {
-        /// What is being worked on, as in "scene 'room'".
-        what: String,
-        holder: Box<Owner>,
-        /// How long it has given no sign of life.
-        silence: std::time::Duration,
-        /// The file that states it.
-        path: PathBuf,
     },
     /// Scenes were changed apart, and the dataset does not list the changes yet.
     #[error(
@@ -108,24 +80,12 @@ pub enum SceneError {
         /// The number of scenes that the dataset lists.
         total: usize,
     },
-    /// An output exists and replacing it was not allowed.
-    #[error("'{}' already exists; choose another {place}, or add --force to overwrite it", path.display())]
-    Exists {
-        path: PathBuf,
-        /// The argument of the command that names the output, as in `--out`.
-        place: &'static str,
-    },
+    /// A file or folder could not be read, written or guarded.
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-}
-
-impl SceneError {
-    /// A constructor of [`SceneError::Io`] for `map_err`.
-    pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.into();
-        move |source| Self::Io { action, path, source }
-    }
 }
 
 /// What helps where a file has another format than the one that is read.

@@ -99,20 +99,3 @@ impl std::fmt::Display for Finding {
         write!(f, ": {}; {}", self.message, self.action)
     }
 }
-
-/// The first 80 characters of untrusted text, with control characters escaped.
-pub fn shortened(text: &str) -> String {
-    let short: String = text.chars().take(80).collect::<String>().escape_debug().to_string();
-    if text.chars().nth(80).is_some() { format!("{short}...") } else { short }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_texts_are_cut() {
-        assert_eq!(shortened("a\nb"), "a\\nb");
-        assert_eq!(shortened(&"x".repeat(100)).len(), 83);
-    }
-}

@@ -8,7 +8,8 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 use gltf_json as json;
 use json::validation::{Checked, USize64};
-use mateval_image::store::write_whole;
+use mateval_files::FileError;
+use mateval_files::whole::write_whole;
 
 use crate::gltf_file::{GltfError, indices, numbers, triangles};
 use crate::mesh::TriangleMesh;
@@ -185,11 +186,11 @@ impl Writer {
 /// Reads every node that has a mesh, in the file's order. Fails where positions or uv are not finite or an index is out
 /// of range.
 pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
-    let length = std::fs::metadata(path).map_err(SceneError::io("read", path))?.len();
+    let length = std::fs::metadata(path).map_err(FileError::io("read", path))?.len();
     if length > MAX_GLB_BYTES {
         return Err(invalid(path, "", format!("{length} bytes; expected at most {MAX_GLB_BYTES}")));
     }
-    let bytes = std::fs::read(path).map_err(SceneError::io("read", path))?;
+    let bytes = std::fs::read(path).map_err(FileError::io("read", path))?;
     let file = crate::gltf_file::parse(&bytes).map_err(|error| invalid(path, "", error.to_string()))?;
     let blob = [file.blob.as_deref().unwrap_or_default()];
     file.document

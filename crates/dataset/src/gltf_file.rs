@@ -10,7 +10,7 @@ use gltf::accessor::sparse::IndexType;
 use gltf::binary::Glb;
 use gltf::json::camera::Type;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
-use mateval_image::limits::{hint, without_mark};
+use mateval_files::untrusted::{hint, without_mark};
 use serde_json::{Map, Value};
 
 use crate::material::StatedParameters;

@@ -3,16 +3,16 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use mateval_image::limits::read_at_most;
-use mateval_image::limits::{hint, without_mark};
-use mateval_image::store::write_whole;
+use mateval_files::FileError;
+use mateval_files::untrusted::{hint, read_at_most, without_mark};
+use mateval_files::whole::write_whole;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::ser::{Formatter, PrettyFormatter};
 use serde_path_to_error::Segment;
 
-use crate::findings::shortened;
 use crate::{Finding, SceneError, Severity};
+use mateval_files::untrusted::shortened;
 
 /// Largest JSON file that is read, in bytes.
 const MAX_JSON_BYTES: u64 = 256 << 20;
@@ -98,13 +98,13 @@ fn separate<W: ?Sized + Write>(writer: &mut W, first: bool) -> io::Result<()> {
 
 /// Reads a file; what does not fit is an error with its JSON pointer, line and column.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
-    parse(path, &read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?)
+    parse(path, &read_at_most(path, MAX_JSON_BYTES).map_err(FileError::io("read", path))?)
 }
 
 /// Reads a file of the format `expected`. Another format is [`SceneError::Format`], whatever else differs from what
 /// this version reads.
 pub fn read_format<T: DeserializeOwned>(path: &Path, expected: &'static str) -> Result<T, SceneError> {
-    let text = read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?;
+    let text = read_at_most(path, MAX_JSON_BYTES).map_err(FileError::io("read", path))?;
     parse_format(path, &text, expected)
 }
 

@@ -3,9 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::SceneError;
 use crate::ids::{InstanceId, PartSetId, RendererId, SceneId, ViewId};
-use crate::lease::{self, Lease};
-use crate::{SceneError, work_folder};
+use mateval_files::lease::{self, Lease};
+use mateval_files::{FileError, work_folder};
 
 pub const DATASET: &str = "dataset.json";
 pub const TARGETS: &str = "targets.json";
@@ -214,12 +215,12 @@ impl BuildFolder {
 
     /// The right to begin or change the build; waits for other processes, which need it for a moment.
     pub fn lease_of_start(&self) -> Result<Lease, SceneError> {
-        Lease::wait(&self.0.join("leases/start"), "the start of the build")
+        Ok(Lease::wait(&self.0.join("leases/start"), "the start of the build")?)
     }
 
     /// The right to write the dataset's `compare.json`; waits for other processes, which need it for a moment.
     pub fn lease_of_verdict(&self) -> Result<Lease, SceneError> {
-        Lease::wait(&self.0.join("leases/verdict"), "the dataset's compare.json")
+        Ok(Lease::wait(&self.0.join("leases/verdict"), "the dataset's compare.json")?)
     }
 
     fn scene_lease(&self, scene: &SceneId) -> (PathBuf, String) {
@@ -233,9 +234,9 @@ impl BuildFolder {
     /// Notes that the scene is about to differ from what the manifest lists.
     pub fn note_change(&self, scene: &SceneId) -> Result<(), SceneError> {
         let path = self.changed_folder();
-        std::fs::create_dir_all(&path).map_err(SceneError::io("make", &path))?;
+        std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
         let path = path.join(scene.as_str());
-        std::fs::write(&path, "").map_err(SceneError::io("write", path))
+        Ok(std::fs::write(&path, "").map_err(FileError::io("write", path))?)
     }
 
     /// The scenes that differ from what the manifest lists.
@@ -249,7 +250,7 @@ impl BuildFolder {
 
     /// Notes that the manifest lists all scenes as they are.
     pub fn forget_changes(&self) -> Result<(), SceneError> {
-        work_folder::remove(&self.changed_folder())
+        Ok(work_folder::remove(&self.changed_folder())?)
     }
 
     fn changed_folder(&self) -> PathBuf {

@@ -4,8 +4,8 @@
 //!
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mod@mesh`], [`material`] and
 //! [`mod@reference`] describe a scene with its materials and lights. [`dataset`], [`layout`], [`manifest`], [`open`]
-//! and [`render_file`] are the files of a dataset, [`submission`] those of a submission. [`obj`], [`gltf_file`] and
-//! [`source_folder`] read untrusted files; [`work_folder`] and [`lease`] guard what several processes write.
+//! and [`render_file`] are the files of a dataset, [`submission`] those of a submission. [`obj`] and [`gltf_file`]
+//! read untrusted files.
 
 pub mod camera;
 pub mod dataset;
@@ -16,7 +16,6 @@ pub mod gltf_file;
 pub mod ids;
 pub mod json;
 pub mod layout;
-pub mod lease;
 pub mod manifest;
 pub mod material;
 pub mod mesh;
@@ -26,12 +25,10 @@ pub mod progress;
 pub mod reference;
 pub mod render_file;
 pub mod scene_cost;
-pub mod source_folder;
 pub mod specular_glossiness;
 pub mod splitmix64;
 pub mod submission;
 pub mod word_enum;
-pub mod work_folder;
 
 pub use camera::{Camera, Intrinsics};
 pub use dataset::{Role, SceneLights, SourceKind};

@@ -4,43 +4,19 @@
 //! them again; [`change_scene`] lets one process at a time change a scene without hiding other changes.
 
 use std::collections::BTreeMap;
-use std::io::Read as _;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-use mateval_image::store::{is_abandoned, is_temporary, write_whole};
+use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
+use mateval_files::whole::{is_abandoned, is_temporary, write_whole};
+use mateval_files::{FileError, work_folder};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use crate::layout::{BuildFolder, COMPARE, DATASET, MANIFEST, SceneFolder, is_rendered};
-use crate::{Finding, SceneError, SceneId, Severity, json, work_folder};
+use crate::{Finding, SceneError, SceneId, Severity, json};
 
 /// The code of a finding about a file that the manifest lists and the dataset lacks.
 pub const MISSING_FILE: &str = "missing_file";
-
-/// SHA-256 of bytes, hex.
-pub fn sha256_of_bytes(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
-}
-
-/// SHA-256 of a file's bytes, hex.
-pub fn sha256_of_file(path: &Path) -> Result<String, SceneError> {
-    let mut file = std::fs::File::open(path).map_err(SceneError::io("read", path))?;
-    let mut hash = Sha256::new();
-    let mut block = vec![0; 1 << 16];
-    loop {
-        let length = file.read(&mut block).map_err(SceneError::io("read", path))?;
-        if length == 0 {
-            return Ok(hex(&hash.finalize()));
-        }
-        hash.update(&block[..length]);
-    }
-}
-
-/// Bytes in hexadecimal digits, as hashes are written.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
 
 /// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files
 /// in `root` itself. Links to folders are not followed.
@@ -56,10 +32,10 @@ fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, SceneError> {
     let mut folders = vec![below.to_owned()];
     while let Some(folder) = folders.pop() {
         let path = root.join(&folder);
-        for entry in std::fs::read_dir(&path).map_err(SceneError::io("list", &path))? {
-            let entry = entry.map_err(SceneError::io("list", &path))?;
+        for entry in std::fs::read_dir(&path).map_err(FileError::io("list", &path))? {
+            let entry = entry.map_err(FileError::io("list", &path))?;
             let relative = folder.join(entry.file_name());
-            let kind = entry.file_type().map_err(SceneError::io("look at", entry.path()))?;
+            let kind = entry.file_type().map_err(FileError::io("look at", entry.path()))?;
             if kind.is_dir() {
                 folders.push(relative);
             } else {
@@ -135,7 +111,7 @@ impl Entry {
 /// The valid lines of the manifest in their order; [`check`] reports the others.
 pub fn entries(root: &Path) -> Result<Vec<Entry>, SceneError> {
     let path = root.join(MANIFEST);
-    let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
+    let text = std::fs::read_to_string(&path).map_err(FileError::io("read", &path))?;
     Ok(text.lines().filter_map(Entry::parse).collect())
 }
 
@@ -147,7 +123,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
 /// Compares those files with the manifest that `concerns` accepts by their paths in the dataset.
 pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
     let path = root.join(MANIFEST);
-    let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
+    let text = std::fs::read_to_string(&path).map_err(FileError::io("read", &path))?;
     let mut findings = Vec::new();
     let mut listed = std::collections::BTreeSet::new();
     for (number, line) in text.lines().enumerate() {
@@ -301,7 +277,7 @@ impl SceneHashes {
                 Ok(found) if found == listed.sha256 => listed.stamp = stamp,
                 Ok(found) => findings.push(changed_file(file, &found, &listed.sha256)),
                 Err(_) if stamp.is_none() => findings.push(missing_file(file)),
-                Err(error) => return Err(error),
+                Err(error) => return Err(error.into()),
             }
         }
         let unlisted = self.found()?.into_iter().filter(|file| concerns(file) && !self.files.contains_key(file));
@@ -338,7 +314,7 @@ impl SceneHashes {
     fn keep(&self) -> Result<(), SceneError> {
         let list = BuildFolder::of(&self.root).hashes(&self.scene);
         let parent = list.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(parent).map_err(SceneError::io("make", parent))?;
+        std::fs::create_dir_all(parent).map_err(FileError::io("make", parent))?;
         // Without line breaks: nobody reads it, and a room has hundreds of files.
         let text = serde_json::to_string(&self.files).expect("names, numbers and hashes become JSON");
         Ok(write_whole(&list, text.as_bytes())?)
@@ -399,13 +375,6 @@ pub fn change_scene<T, E: From<SceneError>>(
 mod tests {
     use super::*;
 
-    /// The hash of "abc" is the example of FIPS 180-4.
-    #[test]
-    fn known_hash() {
-        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(sha256_of_bytes(b"abc"), expected);
-    }
-
     #[test]
     fn names_missing_changed_and_unlisted() {
         let folder = tempfile::tempdir().unwrap();
@@ -416,8 +385,8 @@ mod tests {
         }
         write(root).unwrap();
         assert!(check(root).unwrap().is_empty());
-        let live = mateval_image::store::beside(&root.join("scenes/e")).unwrap();
-        let own = mateval_image::store::Owner::this_process();
+        let live = mateval_files::whole::beside(&root.join("scenes/e")).unwrap();
+        let own = mateval_files::whole::Owner::this_process();
         let dead = root.join(format!("scenes/.e.{}-{}-1-0.partial", own.host, own.process));
         for path in [&live, &dead] {
             std::fs::write(path, "half").unwrap();
@@ -469,7 +438,7 @@ mod tests {
         let mut hashes = SceneHashes::empty(root.path(), &id);
         hashes.update().unwrap();
         let place = |file: &str| root.path().join("scenes/room").join(file);
-        let unfinished = mateval_image::store::beside(&place("a")).unwrap();
+        let unfinished = mateval_files::whole::beside(&place("a")).unwrap();
         std::fs::write(&unfinished, "half").unwrap();
         assert_eq!(codes(SceneHashes::open(root.path(), &id).unwrap().check(|_| true).unwrap()), [""; 0]);
         // Written again with the same bytes: another time, and the same file.

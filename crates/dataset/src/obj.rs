@@ -5,10 +5,10 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_image::limits::{hint, mistaken_for, without_mark};
+use mateval_files::untrusted::{hint, mistaken_for, without_mark};
 
 use crate::TriangleMesh;
-use crate::findings::shortened;
+use mateval_files::untrusted::shortened;
 
 /// Positions farther from the origin than this are not exact enough as 32-bit floats.
 const NEAR: f64 = 1000.0;

@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_image::store::is_temporary;
+use mateval_files::untrusted::sha256_of_file;
+use mateval_files::whole::is_temporary;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +34,7 @@ impl Dataset {
     /// Other files are not hashed: see [`Dataset::check_files`]. A scene may be missing as a whole, but not in part.
     pub fn open(root: &Path) -> Result<Self, SceneError> {
         let file = read_dataset_file(root)?;
-        let found = manifest::sha256_of_file(&root.join(MANIFEST))?;
+        let found = sha256_of_file(&root.join(MANIFEST))?;
         if found != file.manifest_sha256 {
             let what = format!(
                 "manifest_sha256 is {}, but MANIFEST.sha256 hashes to {found}; an unfinished `prep` or a changed file",

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::Vec2;
+use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap, png_io};
@@ -365,7 +366,7 @@ pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
 /// Writes textures to the folder `textures` in `place`, which is made.
 fn write_textures(place: &Path, textures: &[SourceTexture]) -> Result<Vec<TextureEntry>, SceneError> {
     let folder = place.join("textures");
-    std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
     textures.iter().enumerate().map(|(index, source)| write_texture(&folder, index, source)).collect()
 }
 

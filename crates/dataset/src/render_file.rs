@@ -10,8 +10,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::layout::{BuildFolder, COMPARE, is_rendered};
-use crate::manifest::{SceneHashes, sha256_of_bytes};
+use crate::manifest::SceneHashes;
 use crate::{RendererId, SceneError, SceneId, ViewId, json};
+use mateval_files::untrusted::sha256_of_bytes;
 
 /// The name of the file. It is written last, so its presence means that a view's pictures are complete.
 pub const RENDER_FILE: &str = "render.json";

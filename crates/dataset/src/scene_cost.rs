@@ -10,7 +10,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::layout::BuildFolder;
-use crate::{RendererId, SceneError, SceneId, json, work_folder};
+use crate::{RendererId, SceneError, SceneId, json};
+use mateval_files::{FileError, work_folder};
 
 /// The format of this version of the file.
 const COST_FORMAT: &str = "mateval-cost/1";
@@ -73,7 +74,7 @@ pub fn read(root: &Path, scene: &SceneId) -> Result<Vec<StepCost>, SceneError> {
 
 /// Forgets the costs of a scene that is about to be built again.
 pub fn forget(root: &Path, scene: &SceneId) -> Result<(), SceneError> {
-    work_folder::remove(&BuildFolder::of(root).cost(scene))
+    Ok(work_folder::remove(&BuildFolder::of(root).cost(scene))?)
 }
 
 /// Does the work and, if it succeeds, adds its cost to those recorded. The caller holds the scene's lease. A record
@@ -103,7 +104,7 @@ pub fn timed<T, E: From<SceneError>>(
 fn write(root: &Path, scene: &SceneId, steps: Vec<StepCost>) -> Result<(), SceneError> {
     let path = BuildFolder::of(root).cost(scene);
     let folder = path.parent().unwrap_or(root);
-    std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+    std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
     json::write(&path, &CostFile { format: COST_FORMAT.to_owned(), steps })
 }
 
@@ -153,7 +154,7 @@ mod tests {
         let renderer = (step == Step::Render).then_some(&renderer);
         timed(root, &scene, &TimedStep { step, renderer, is_alone }, || match works {
             true => Ok(()),
-            false => Err(SceneError::io("read", root)(std::io::Error::other("no"))),
+            false => Err(FileError::io("read", root)(std::io::Error::other("no")).into()),
         })
     }
 

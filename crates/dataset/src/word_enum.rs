@@ -1,6 +1,8 @@
 //! Macros for types that are words in files: [`word_enum!`](crate::word_enum!) for enums whose variants are words,
 //! [`by_text!`](crate::by_text!) for types that print and parse themselves.
 
+use mateval_files::untrusted::quoted;
+
 /// A word that an enum does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} is not a {what}; expected one of: {expected}", quoted(.word))]
@@ -10,11 +12,6 @@ pub struct UnknownWord {
     pub word: String,
     /// The words that are known, separated by commas.
     pub expected: String,
-}
-
-/// An untrusted text in quotes, without control characters and at most 80 characters long.
-pub fn quoted(text: &str) -> String {
-    format!("'{}'", text.chars().take(80).collect::<String>().escape_debug())
 }
 
 /// Defines an enum with `ALL`, `word`, `Display`, `FromStr`, serde and a schema. Variants compare as their words do, so

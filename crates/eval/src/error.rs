@@ -4,18 +4,13 @@ use std::path::PathBuf;
 
 use mateval_dataset::ids::quoted;
 use mateval_dataset::{SceneId, ViewId};
+use mateval_files::FileError;
 
 /// Why something could not be scored or shown.
 #[derive(Debug, thiserror::Error)]
 pub enum EvalError {
-    /// The file system refused.
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// What was tried, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// Scores may only be taken from the cache, and are not there.
     #[error(
         "these scores are not in the cache:{}\nscore these scenes with the same --cache, --protocol and version first",
@@ -109,12 +104,6 @@ impl EvalError {
     pub(crate) fn no_input_view(scene: &SceneId) -> Self {
         let [expected, found] = ["an input view", "none"].map(str::to_owned);
         Self::Unsound { place: format!("scene '{scene}'"), expected, found }
-    }
-
-    /// The error of an action on a path.
-    pub(crate) fn io(action: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
-        let path = path.to_owned();
-        move |source| Self::Io { action, path, source }
     }
 }
 

@@ -9,6 +9,7 @@
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::{InstanceId, SceneId, ViewId};
+use mateval_files::FileError;
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Picture, exr_io};
 
@@ -32,7 +33,7 @@ impl PicturesDir<'_> {
         instance: &InstanceId,
     ) -> Result<PathBuf, EvalError> {
         let folder = self.folders[submission].join(scene.as_str()).join("texels");
-        std::fs::create_dir_all(&folder).map_err(EvalError::io("create", &folder))?;
+        std::fs::create_dir_all(&folder).map_err(FileError::io("create", &folder))?;
         Ok(folder.join(instance.as_str()).with_extension("exr"))
     }
 
@@ -83,6 +84,6 @@ impl PicturesDir<'_> {
 }
 
 fn write(folder: &Path, name: &str, picture: &Picture<LinearRgb>) -> Result<(), EvalError> {
-    std::fs::create_dir_all(folder).map_err(EvalError::io("create", folder))?;
+    std::fs::create_dir_all(folder).map_err(FileError::io("create", folder))?;
     Ok(exr_io::write_linear(&folder.join(name).with_extension("exr"), picture, Precision::Float)?)
 }

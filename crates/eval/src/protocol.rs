@@ -113,7 +113,7 @@ impl Protocol {
 
     /// SHA-256, hex, of the protocol alone, as `dataset_spec/PROTOCOL.md` publishes it.
     pub fn sha256(&self) -> String {
-        mateval_dataset::manifest::sha256_of_bytes(mateval_dataset::json::to_text(self).as_bytes())
+        mateval_files::untrusted::sha256_of_bytes(mateval_dataset::json::to_text(self).as_bytes())
     }
 
     /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, and the weights of LPIPS, which may
@@ -126,7 +126,7 @@ impl Protocol {
     ) -> String {
         let weights = lpips_weights_sha256.unwrap_or("missing");
         let text = mateval_dataset::json::to_text(&(self, dataset_manifest_sha256, scenes, weights));
-        mateval_dataset::manifest::sha256_of_bytes(text.as_bytes())
+        mateval_files::untrusted::sha256_of_bytes(text.as_bytes())
     }
 }
 

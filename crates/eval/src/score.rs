@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::BuildFolder;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::open::DatasetId;
 use mateval_dataset::render_file::{CompareCounts, VerdictFile};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
+use mateval_files::FileError;
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_metrics::Lpips;
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::files::SubmissionJson;
@@ -313,7 +314,7 @@ impl ScorePlan<'_> {
         scores: &[SceneScore],
     ) -> Result<(), EvalError> {
         let Some(folder) = self.cache else { return Ok(()) };
-        std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         for (protocol, score) in self.protocols.iter().zip(scores) {
             if let Some(path) = self.cache_file(scene, prediction, protocol) {
                 json::write(&path, score)?;

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::{Progress, ViewId};
+use mateval_files::untrusted::sha256_of_bytes;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

@@ -9,7 +9,8 @@ use mateval_dataset::layout::{INPUT, MANIFEST};
 use mateval_dataset::manifest::{self, Entry, MISSING_FILE};
 use mateval_dataset::open::{Dataset, is_below};
 use mateval_dataset::{Camera, Finding, Progress, Report, SceneError, SceneId, ViewId};
-use mateval_image::store::write_whole;
+use mateval_files::FileError;
+use mateval_files::whole::write_whole;
 
 /// A format that a dataset can be written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,13 +55,8 @@ pub enum ExportError {
     /// The output exists; what it holds is not looked into, so it is never replaced.
     #[error("'{}' already exists; choose another --out, or remove it", path.display())]
     Exists { path: PathBuf },
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// What was attempted, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// The manifest lists hidden files, which are not exported, and without which the copy would not be the dataset.
     #[error(
         "'{}' lists {} hidden files ('{}' first), which are never exported: remove them and make the dataset again",
@@ -94,14 +90,6 @@ pub enum ExportError {
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-}
-
-impl ExportError {
-    /// A constructor of [`ExportError::Io`] for `map_err`.
-    pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.into();
-        move |source| Self::Io { action, path, source }
-    }
 }
 
 /// A dataset that may be exported.
@@ -219,12 +207,12 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
 
 pub(crate) fn copy_file(from: &Path, to: &Path) -> Result<(), ExportError> {
     make_folder_of(to)?;
-    std::fs::copy(from, to).map_err(ExportError::io("copy", from))?;
+    std::fs::copy(from, to).map_err(FileError::io("copy", from))?;
     Ok(())
 }
 
 /// Makes the folder that `path` lies in.
 pub(crate) fn make_folder_of(path: &Path) -> Result<(), ExportError> {
     let folder = path.parent().expect("an export writes below its own folder");
-    std::fs::create_dir_all(folder).map_err(ExportError::io("make", folder))
+    Ok(std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?)
 }

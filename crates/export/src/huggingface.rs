@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mateval_dataset::{Camera, Progress, Report};
+use mateval_files::FileError;
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int32Type};
 use parquet::errors::ParquetError;
@@ -37,7 +38,7 @@ pub fn export(sound: &SoundDataset, out: &Path, progress: Progress<'_>) -> Resul
         let licence = licence_text(&sound.dataset, &scene.id);
         let row = |view| {
             let picture = picture(&sound.dataset, scene, view).map(|file| sound.dataset.root.join(file));
-            let read = |file| std::fs::read(&file).map_err(ExportError::io("read", &file));
+            let read = |file| std::fs::read(&file).map_err(FileError::io("read", &file));
             Ok(Row {
                 scene: scene.id.to_string(),
                 view: view.id.to_string(),
@@ -174,7 +175,7 @@ pub fn write_parquet(
     groups: impl Iterator<Item = Result<Vec<Row>, ExportError>>,
 ) -> Result<(), ExportError> {
     let failed = |source: ParquetError| ExportError::Parquet { path: path.to_owned(), source };
-    let file = File::create(path).map_err(ExportError::io("write", path))?;
+    let file = File::create(path).map_err(FileError::io("write", path))?;
     let schema = Arc::new(parse_message_type(SCHEMA).expect("the schema above is valid"));
     let properties = WriterProperties::builder()
         .set_compression(Compression::UNCOMPRESSED)

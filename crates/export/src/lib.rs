@@ -15,8 +15,8 @@ pub mod tars;
 
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::work_folder::{WorkFolder, is_inside};
 use mateval_dataset::{Progress, Report};
+use mateval_files::work_folder::{WorkFolder, is_inside};
 
 pub use dataset::{ExportError, Exported, Format};
 use dataset::{ShownView, SoundDataset, shown_views, write_licence};

@@ -8,9 +8,10 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST};
-use mateval_dataset::manifest::hex;
 use mateval_dataset::open::is_below;
 use mateval_dataset::{Progress, Report};
+use mateval_files::FileError;
+use mateval_files::untrusted::hex;
 use sha2::{Digest as _, Sha256};
 
 use crate::dataset::{ExportError, Exported, SoundDataset, make_folder_of, write_file, write_licences};
@@ -60,13 +61,13 @@ pub fn write(sound: &SoundDataset, out: &Path, progress: Progress<'_>) -> Result
 fn write_tar(root: &Path, files: &[&str], out: &Path, name: &str) -> Result<WrittenTar, ExportError> {
     let path = out.join(name);
     make_folder_of(&path)?;
-    let file = File::create(&path).map_err(ExportError::io("write", &path))?;
+    let file = File::create(&path).map_err(FileError::io("write", &path))?;
     let mut tar = tar::Builder::new(Hashed { inner: BufWriter::new(file), hash: Sha256::new(), bytes: 0 });
     for file in files {
-        append(&mut tar, root, file).map_err(ExportError::io("pack", root.join(file)))?;
+        append(&mut tar, root, file).map_err(FileError::io("pack", root.join(file)))?;
     }
-    let mut hashed = tar.into_inner().map_err(ExportError::io("write", &path))?;
-    hashed.flush().map_err(ExportError::io("write", &path))?;
+    let mut hashed = tar.into_inner().map_err(FileError::io("write", &path))?;
+    hashed.flush().map_err(FileError::io("write", &path))?;
     Ok(WrittenTar { name: name.to_owned(), sha256: hex(&hashed.hash.finalize()), bytes: hashed.bytes })
 }
 

@@ -10,11 +10,12 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DQuat, DVec2, DVec3};
 use mateval_dataset::dataset::DatasetFile;
-use mateval_dataset::manifest::{self, sha256_of_file};
+use mateval_dataset::manifest;
 use mateval_dataset::open::DatasetId;
 use mateval_dataset::open::{Dataset, chosen_ids};
 use mateval_dataset::{Camera, SceneError, SceneId, json};
 use mateval_export::{ExportError, ExportOptions, Exported, Format, export};
+use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_image::exr_io;
 use mateval_testkit::packed::files;
 use mateval_testkit::{copy_folder, sample_dataset};
@@ -451,7 +452,7 @@ fn renew(root: &std::path::Path, text: Option<String>) {
     let sha256 = match text {
         Some(text) => {
             std::fs::write(root.join("MANIFEST.sha256"), &text).unwrap();
-            manifest::sha256_of_bytes(text.as_bytes())
+            sha256_of_bytes(text.as_bytes())
         }
         None => manifest::write(root).unwrap(),
     };
@@ -499,7 +500,7 @@ fn names_that_lead_out_of_the_dataset() {
     let absolute = above.path().join("secret").to_str().unwrap().to_owned();
     let listed = std::fs::read_to_string(inside.join("MANIFEST.sha256")).unwrap();
     for name in ["../secret", "scenes/../../secret", absolute.as_str()] {
-        let line = format!("{}  {name}\n", manifest::sha256_of_bytes(b"x"));
+        let line = format!("{}  {name}\n", sha256_of_bytes(b"x"));
         renew(&inside, Some(format!("{listed}{line}")));
         for format in FORMATS {
             let (out, found) = exported(&inside, format);

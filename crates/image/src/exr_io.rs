@@ -15,8 +15,8 @@ use exr::prelude::traits::*;
 use half::f16;
 
 use crate::limits::{check_size, read_file};
-use crate::store::write_whole;
 use crate::{ImageError, LinearRgb, Normal, Picture};
+use mateval_files::whole::write_whole;
 
 /// Most samples of a layer in all channels together: one gibibyte as floats.
 const MAX_SAMPLES: usize = 1 << 28;
@@ -155,7 +155,7 @@ pub fn write_channels(
         .non_parallel()
         .to_buffered(&mut bytes)
         .map_err(|error| ImageError::Unsupported { path: path.to_owned(), what: error.to_string() })?;
-    write_whole(path, bytes.get_ref())
+    Ok(write_whole(path, bytes.get_ref())?)
 }
 
 type FlatLayer = ex::Layer<ex::AnyChannels<ex::FlatSamples>>;

@@ -4,17 +4,17 @@
 //! typed pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for
 //! lookups ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
 //!
-//! In between, [`limits`] are checked on a file's header before memory is taken, [`transfer`] converts colours between
-//! sRGB and linear, and [`store`] puts files in place whole.
+//! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours between
+//! sRGB and linear.
 
 mod color_profile;
 pub mod exr_io;
 pub mod limits;
 pub mod npy_io;
+pub mod npy_numbers;
 pub mod photo;
 pub mod picture;
 pub mod png_io;
-pub mod store;
 pub mod texture;
 pub mod texture_io;
 pub mod transfer;

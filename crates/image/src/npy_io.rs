@@ -18,9 +18,9 @@ use crate::{ImageError, Texels, Texture, Wrap};
 /// The first bytes of a NumPy file.
 pub const NPY_SIGNATURE: &[u8] = b"\x93NUMPY";
 /// The largest header. NumPy's own are below 200 bytes.
-pub const MAX_HEADER_BYTES: usize = 4096;
+pub(crate) const MAX_HEADER_BYTES: usize = 4096;
 /// The most bytes before the header: magic string, version and the header's length.
-pub const MAX_PREFIX_BYTES: usize = 12;
+pub(crate) const MAX_PREFIX_BYTES: usize = 12;
 /// The most digits in a header. The product of any numbers that are written with 16 digits together, times the bytes of
 /// one number, is below 10^17.
 const MAX_HEADER_DIGITS: usize = 16;
@@ -112,7 +112,7 @@ pub(crate) enum NpyPictureError {
     },
 }
 
-fn joined(shape: &[u64]) -> String {
+pub(crate) fn joined(shape: &[u64]) -> String {
     shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
 }
 

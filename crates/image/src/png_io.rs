@@ -11,9 +11,9 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::limits::{check_size, read_file};
-use crate::store::write_whole;
 use crate::transfer::byte_from_unit;
 use crate::{ImageError, Mask, Picture, SrgbRgb};
+use mateval_files::whole::write_whole;
 
 /// Writes 8-bit RGB, clipped to 0..1.
 pub fn write_srgb(path: &Path, picture: &Picture<SrgbRgb>) -> Result<(), ImageError> {
@@ -124,7 +124,7 @@ fn write(
         .write_header()
         .and_then(|mut writer| writer.write_image_data(data))
         .map_err(|error| ImageError::Unsupported { path: path.to_owned(), what: error.to_string() })?;
-    write_whole(path, &bytes)
+    Ok(write_whole(path, &bytes)?)
 }
 
 /// A decoded PNG, with palettes and samples of fewer than eight bits expanded.

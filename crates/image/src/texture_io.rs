@@ -7,11 +7,13 @@ use std::path::Path;
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 
 use crate::exr_io::{self, channels_of_bytes, scalar_of_bytes};
-use crate::limits::{check_size, hint, read_file};
+use crate::limits::{check_size, read_file};
 use crate::npy_io::{self, NPY_SIGNATURE};
 use crate::png_io::{Raw, decode_bytes};
 pub use crate::texture::Encoding;
 use crate::{ImageError, Texels, Texture, Wrap};
+use mateval_files::FileError;
+use mateval_files::untrusted::hint;
 
 /// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
@@ -70,11 +72,7 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
         what: format!("not a valid picture: {error}"),
     };
     let hint = hint(&bytes);
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|source| ImageError::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(FileError::io("read", path))?;
     if reader.format().is_none() {
         let what =
             format!("not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy{hint}");

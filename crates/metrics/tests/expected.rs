@@ -249,8 +249,8 @@ fn the_thread_count_changes_no_bit_of_lpips() {
 /// Small pictures made from integers, and the values that scikit-image and lpips compute for them: `vectors.json`,
 /// which `make_vectors.py` writes from the same pictures.
 mod vectors {
-    use mateval_dataset::manifest::sha256_of_bytes;
     use mateval_dataset::splitmix64::number;
+    use mateval_files::untrusted::sha256_of_bytes;
     use mateval_image::{Mask, Picture, SrgbRgb};
     use serde::Deserialize;
 

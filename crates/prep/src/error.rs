@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::ids::quoted;
 use mateval_dataset::{SceneId, ViewId};
+use mateval_files::FileError;
 
 use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
@@ -13,14 +14,8 @@ use crate::render::RendererKind;
 /// Why a dataset, its renders or a survey could not be made or examined.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepError {
-    /// A file or folder could not be read or written.
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// What was tried, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// A file or folder is not what the command needs, or must not be replaced.
     #[error("'{}' {why}", path.display())]
     Unusable {
@@ -75,7 +70,7 @@ pub enum PrepError {
     UnknownHouse { name: String, houses: usize },
     /// A path given to a survey does not lie in the source's folder.
     #[error("{0}; a recipe cannot refer to it: name the folder that contains all inputs with --source")]
-    OutsideSource(#[from] mateval_sources::below::BelowError),
+    OutsideSource(#[from] mateval_files::source_folder::BelowError),
     /// A renderer made a picture of another size than the camera's.
     #[error(
         "scene '{scene}', view '{view}': the rendered picture has {}x{} pixels, expected {}x{}",
@@ -163,11 +158,6 @@ pub enum PrepError {
 }
 
 impl PrepError {
-    /// An [`PrepError::Io`]; to be used with `map_err`.
-    pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.into();
-        move |source| Self::Io { action, path, source }
-    }
     /// A [`PrepError::Unusable`].
     pub(crate) fn unusable(path: impl Into<PathBuf>, why: &'static str) -> Self {
         Self::Unusable { path: path.into(), why }

@@ -9,8 +9,9 @@ use mateval_dataset::open::Dataset as OpenDataset;
 use mateval_dataset::submission::{
     Cost, MAP_SIZES, Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, instance_folder,
 };
-use mateval_dataset::work_folder::WorkFolder;
 use mateval_dataset::{SceneError, SceneId, json};
+use mateval_files::FileError;
+use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, png_io};
 use mateval_submission::map_file::{BASE_COLOR_RANGE, SCALAR_RANGE};
@@ -113,7 +114,7 @@ impl Submission {
         }
         drop(open);
         py.detach(|| {
-            std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+            std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
             files.iter().try_for_each(MapFile::write).map_err(SceneError::from)
         })
         .map_err(failed)
@@ -130,7 +131,7 @@ impl Submission {
         drop(open);
         py.detach(|| {
             json::write(&work.path().join(SUBMISSION), &self.file)?;
-            work.finish()
+            Ok::<_, SceneError>(work.finish()?)
         })
         .map_err(failed)
     }

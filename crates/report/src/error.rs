@@ -8,6 +8,7 @@ use mateval_dataset::{Finding, SceneId};
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
+use mateval_files::FileError;
 
 /// Why results could not be shown, or a dataset not be published or described.
 #[derive(Debug, thiserror::Error)]
@@ -64,7 +65,9 @@ pub enum ReportError {
     /// More than the bootstrap can draw from.
     #[error("cannot rank scenes of {houses} houses; at most {most} are supported")]
     TooManyHouses { houses: usize, most: usize },
-    /// The dataset could not be read, or a file could not be read or written.
+    #[error(transparent)]
+    Files(#[from] FileError),
+    /// The dataset could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_dataset::SceneError),
     /// The dataset could not be verified, or its recipe not be read.

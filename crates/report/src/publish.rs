@@ -8,10 +8,12 @@ use std::path::Path;
 
 use mateval_dataset::dataset::{DatasetFile, FORMAT};
 use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST, is_ground_truth};
-use mateval_dataset::manifest::{self, Entry, sha256_of_bytes};
+use mateval_dataset::manifest::{self, Entry};
 use mateval_dataset::open::check_whole;
-use mateval_dataset::work_folder::{WorkFolder, check_holds_none};
 use mateval_dataset::{Progress, Report, SceneError, json};
+use mateval_files::FileError;
+use mateval_files::untrusted::sha256_of_bytes;
+use mateval_files::work_folder::{WorkFolder, check_holds_none};
 
 use crate::error::ReportError;
 
@@ -80,9 +82,9 @@ fn copy(from: &Path, to: &Path, files: &[&str], progress: &dyn Fn(usize)) -> Res
         progress(done);
         let place = to.join(file);
         if let Some(folder) = place.parent() {
-            std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+            std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         }
-        std::fs::copy(from.join(file), &place).map_err(SceneError::io("write", &place))?;
+        std::fs::copy(from.join(file), &place).map_err(FileError::io("write", &place))?;
     }
     Ok(())
 }

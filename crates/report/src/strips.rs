@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::check_free;
-use mateval_dataset::{Progress, Report, SceneError, SceneId};
+use mateval_dataset::{Progress, Report, SceneId};
 use mateval_eval::protocol::{Protocol, SampleRules, Track};
 use mateval_eval::result::key::PictureKind;
 use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
+use mateval_files::FileError;
+use mateval_files::work_folder::check_free;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
 
@@ -102,7 +103,7 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
     if jobs.len() < chosen.len() * plan.shown.len() {
         progress(Report::Message("scenes with a photo from elsewhere have no pictures of light, which is not known"));
     }
-    std::fs::create_dir_all(plan.out).map_err(SceneError::io("make", plan.out))?;
+    std::fs::create_dir_all(plan.out).map_err(FileError::io("make", plan.out))?;
     let mut written = Vec::new();
     for (done, &(scene, shown)) in jobs.iter().enumerate() {
         progress(Report::step("pictures", done, jobs.len()));

@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::source_folder::{FileFault, SourceFolder};
+use mateval_files::FileError;
+use mateval_files::source_folder::{FileFault, SourceFolder};
 
 use crate::bitterli::BitterliError;
 use crate::front3d::HouseError;
@@ -12,8 +13,8 @@ use crate::gltf::GltfSceneError;
 /// Why a source could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    #[error("cannot read '{}': {source}", path.display())]
-    Io { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// The content of a file is not that of a source, or exceeds a limit.
     #[error("'{}': {reason}", path.display())]
     Invalid {
@@ -54,15 +55,15 @@ pub enum InvalidSource {
 /// Reads the file at `path`, which may have at most `most` bytes. Returns its folder, its name and its bytes. Other
 /// files of the folder may have at most `file_bytes`.
 pub fn open(path: &Path, most: u64, file_bytes: u64) -> Result<(SourceFolder, String, Vec<u8>), SourceError> {
-    let io = |source| SourceError::Io { path: path.to_owned(), source };
     let invalid = |reason| SourceError::invalid(path, reason);
-    let found = std::fs::metadata(path).map_err(io)?.len();
+    let found = std::fs::metadata(path).map_err(FileError::io("read", path))?.len();
     if found > most {
         return Err(invalid(InvalidSource::TooLarge { most, found }));
     }
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
     let name = name.ok_or_else(|| invalid(InvalidSource::NotAFile))?;
-    let mut folder = SourceFolder::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(io)?;
+    let mut folder =
+        SourceFolder::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(FileError::io("read", path))?;
     let bytes = folder.read(&name).map_err(|fault| invalid(InvalidSource::Unreadable(fault)))?;
     Ok((folder, name, bytes))
 }

@@ -8,16 +8,14 @@
 //! [`bitterli`] reads XML. [`front3d`] reads a house's JSON, furnishes its rooms and draws cameras. [`gltf`] reads glTF
 //! files of any tool. They begin with [`error`], which opens the main file, and share [`source_scene`], which collects
 //! findings, [`surface_mesh`], which repairs meshes and splits them into parts, `primitives`, `missing_uv` and
-//! `coincident`. [`npy`] and [`below`] read arrays and paths that a recipe names.
+//! `coincident`.
 
-pub mod below;
 pub mod bitterli;
 mod coincident;
 pub mod error;
 pub mod front3d;
 pub mod gltf;
 mod missing_uv;
-pub mod npy;
 mod primitives;
 pub mod source_scene;
 pub mod surface_mesh;

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 
 use glam::Vec2;
 use mateval_dataset::TriangleMesh;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::TextureIndex;
 use mateval_dataset::reference::{
     Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
+use mateval_files::untrusted::shortened;
 use mateval_image::{Texels, Texture};
 
 use crate::source_scene::{InstanceOrigin, Log};

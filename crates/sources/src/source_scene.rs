@@ -8,8 +8,9 @@ use glam::{DMat4, DVec3};
 use mateval_dataset::material::MaterialClass;
 use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::ReferenceScene;
-use mateval_dataset::source_folder::{FileFault, SourceFolder};
 use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
+use mateval_files::FileError;
+use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_image::ImageError;
 
 /// A licence that must be passed on with the scene.
@@ -117,9 +118,9 @@ pub(crate) fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<L
 /// The fault of a picture. Its message leaves out the path, which the finding gives.
 pub(crate) fn picture_fault(code: &'static str, error: &ImageError) -> FileFault {
     let message = match error {
-        ImageError::Io { source, .. } => source.to_string(),
+        ImageError::Files(FileError::Io { source, .. }) => source.to_string(),
         ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
-        ImageError::PixelCount { .. } => error.to_string(),
+        ImageError::Files(_) | ImageError::PixelCount { .. } => error.to_string(),
     };
     FileFault { code, message }
 }

@@ -1,20 +1,16 @@
 //! What can be wrong with a submission: errors that end a run, faults of single files, findings.
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mateval_dataset::{Finding, Severity};
+use mateval_files::FileError;
 
 /// Why a submission could not be read or checked.
 #[derive(Debug, thiserror::Error)]
 pub enum SubmissionError {
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// What was tried, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FileError),
     #[error("cannot open '{}' as a submission: expected a folder, a .zip or a .tar.gz{hint}", path.display())]
     UnknownKind {
         path: PathBuf,
@@ -38,14 +34,6 @@ pub enum SubmissionError {
     /// A picture could not be read.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-}
-
-impl SubmissionError {
-    /// Turns an error of the file system into this one.
-    pub(crate) fn io(action: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.as_ref().to_owned();
-        move |source| Self::Io { action, path, source }
-    }
 }
 
 /// What the public files of a scene contradict.

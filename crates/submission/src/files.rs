@@ -9,10 +9,10 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, Map, SUBMISSION, SubmissionFile, instance_folder};
 use mateval_dataset::{InstanceId, SceneId};
-use mateval_image::limits::read_at_most;
+use mateval_files::FileError;
+use mateval_files::untrusted::{read_at_most, sha256_of_bytes};
 use serde::Serialize;
 
 use crate::error::{FileFault, SubmissionError};
@@ -117,7 +117,7 @@ impl SubmissionJson {
     /// Reads it from a submission's folder. Fails where it is missing, a link that leads out, or of another format.
     pub fn read(submission: &Path) -> Result<Self, SubmissionError> {
         let path = submission.join(SUBMISSION);
-        path.symlink_metadata().map_err(SubmissionError::io("read", &path))?;
+        path.symlink_metadata().map_err(FileError::io("read", &path))?;
         let source = SubmittedFile::read(submission, &path, MAX_SUBMISSION_BYTES)
             .map_err(|fault| SubmissionError::File { path: path.clone(), fault })?;
         Ok(Self { file: SubmissionFile::parse(&path, source.bytes())?, hashed: source.hashed().clone() })

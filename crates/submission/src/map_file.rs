@@ -7,9 +7,9 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use mateval_dataset::findings::shortened;
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
 use mateval_dataset::{SceneError, TriangleMesh};
+use mateval_files::untrusted::shortened;
 use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
 use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
 use mateval_image::{ImageError, Texels, Texture, texture_io};

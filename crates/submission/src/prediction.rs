@@ -7,10 +7,10 @@
 use std::path::Path;
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::Map;
 use mateval_dataset::{Finding, SceneError, SceneId, Severity};
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{Texels, Texture, Wrap};
 
 use crate::atlas::AtlasMeshes;

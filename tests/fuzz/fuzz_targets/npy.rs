@@ -5,8 +5,8 @@ use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
 use mateval_image::Wrap;
+use mateval_image::npy_numbers::whole_numbers;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
-use mateval_sources::npy::whole_numbers;
 
 fuzz_target!(|bytes: &[u8]| {
     let _ = whole_numbers(bytes);

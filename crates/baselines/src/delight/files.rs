@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::WorkFolder;
-use mateval_dataset::{Progress, Report, SceneError, json};
+use mateval_dataset::{Progress, Report, json};
+use mateval_files::FileError;
+use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
@@ -55,7 +56,7 @@ pub fn write(
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let delit = delight(&geometry, options, progress)?;
         let folder = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
         write_pictures(&folder, &delit, scene.exposure as f32)?;
         let shown = Shown { id: scene.id.to_string(), lights: delit.lights.clone(), rounds: delit.rounds };
         let lights = LightsFile { format: LIGHTS_FORMAT.to_owned(), candidates: options.lights, lights: delit.lights };
@@ -63,7 +64,7 @@ pub fn write(
         scenes.push(shown);
     }
     let index = work.path().join("index.html");
-    std::fs::write(&index, html(&scenes)).map_err(SceneError::io("write", &index))?;
+    std::fs::write(&index, html(&scenes)).map_err(FileError::io("write", &index))?;
     work.finish()?;
     Ok(scenes.len())
 }

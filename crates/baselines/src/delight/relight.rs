@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::WorkFolder;
 use mateval_dataset::{Progress, Report, SceneError, json};
+use mateval_files::FileError;
+use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, read_linear, read_scalar, write_linear};
 use mateval_image::png_io::jpeg_bytes;
 use mateval_image::png_io::write_srgb;
@@ -76,7 +77,7 @@ pub fn write(
         let factors: Vec<f64> = delit.lights.names().map(|name| factor(&options.dimmed, name)).collect();
         let relit = relight(&room, &delit, &factors, options.samples, progress)?;
         let folder = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
         let exposure = scene.exposure as f32;
         write_linear(&folder.join("relit.exr"), &relit.whole, Precision::Float)?;
         write_srgb(&folder.join("relit.png"), &exposed(&relit.whole, exposure))?;
@@ -84,7 +85,7 @@ pub fn write(
         shown.push(section(scene, &relit, &delit, &factors));
     }
     let index = work.path().join("index.html");
-    std::fs::write(&index, html(&shown)).map_err(SceneError::io("write", &index))?;
+    std::fs::write(&index, html(&shown)).map_err(FileError::io("write", &index))?;
     work.finish()?;
     Ok(shown.len())
 }

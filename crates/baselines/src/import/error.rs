@@ -1,9 +1,9 @@
 //! Why a file of an import was refused, and the largest files that are imported.
 
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::obj::ObjError;
-use mateval_dataset::source_folder::FileFault;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::shortened;
 use mateval_image::ImageError;
 
 /// Largest number of triangles in a file.

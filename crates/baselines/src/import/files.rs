@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use mateval_dataset::dataset::{Instance, SceneFile};
-use mateval_dataset::source_folder::SourceFolder;
 use mateval_dataset::{InstanceId, PartSetId, SceneId, json};
+use mateval_files::FileError;
+use mateval_files::source_folder::SourceFolder;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -113,8 +114,7 @@ impl ImportFolder {
     }
 
     fn folder(&self) -> Result<SourceFolder, BaselineError> {
-        let io = |source| BaselineError::Io { action: "open", path: self.path.clone(), source };
-        SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(io)
+        Ok(SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(FileError::io("open", &self.path))?)
     }
 }
 

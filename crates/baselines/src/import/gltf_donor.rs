@@ -10,8 +10,8 @@ use gltf::material::PbrSpecularGlossiness;
 use gltf::mesh::Mode;
 use mateval_dataset::gltf_file::{GltfFile, INSTANCING, parse};
 use mateval_dataset::gltf_file::{first_numbers, indices, numbers, triangles, view_bytes};
-use mateval_dataset::source_folder::SourceFolder;
 use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
+use mateval_files::source_folder::SourceFolder;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 

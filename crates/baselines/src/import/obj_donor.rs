@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_dataset::obj::{self, Materials, ObjLimits, ObjMaterial};
-use mateval_dataset::source_folder::SourceFolder;
+use mateval_files::source_folder::SourceFolder;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texture, Wrap};

@@ -19,8 +19,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::{WorkFolder, check_free};
-use mateval_dataset::{Progress, SceneError, json};
+use mateval_dataset::{Progress, json};
+use mateval_files::FileError;
+use mateval_files::work_folder::{WorkFolder, check_free};
 use mateval_image::png_io;
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
@@ -82,7 +83,7 @@ pub fn write(
         })?;
         // The scene's folder of the report.
         let place = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&place).map_err(SceneError::io("make", &place))?;
+        std::fs::create_dir_all(&place).map_err(FileError::io("make", &place))?;
         write_graphs(&place.join("materials.mtlx"), &materials)?;
         let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
         let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;
@@ -91,7 +92,7 @@ pub fn write(
         Ok(count)
     })?;
     let index = work.path().join("index.html");
-    std::fs::write(&index, html(&method, &scenes)).map_err(SceneError::io("write", &index))?;
+    std::fs::write(&index, html(&method, &scenes)).map_err(FileError::io("write", &index))?;
     let file = ReportFile {
         format: REPORT_FORMAT.to_owned(),
         method: method.name,
@@ -159,9 +160,9 @@ fn fitter(options: &ProceduralOptions) -> Result<Fitter, BaselineError> {
 /// Reads every `.mtlx` file of a folder, in the order of their names. Fails with everything that is wrong with any of
 /// them, and where there is none.
 fn read(folder: &Path) -> Result<Vec<Graph>, BaselineError> {
-    let entries = std::fs::read_dir(folder).map_err(SceneError::io("read", folder))?;
+    let entries = std::fs::read_dir(folder).map_err(FileError::io("read", folder))?;
     let paths: Result<Vec<PathBuf>, _> = entries.map(|entry| entry.map(|entry| entry.path())).collect();
-    let mut paths = paths.map_err(SceneError::io("read", folder))?;
+    let mut paths = paths.map_err(FileError::io("read", folder))?;
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "mtlx"));
     paths.sort();
     if paths.is_empty() || paths.len() > MOST_FILES {

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mateval_dataset::SceneError;
 use mateval_dataset::dataset::{Part, SceneFile};
-use mateval_dataset::manifest::sha256_of_bytes;
+use mateval_files::FileError;
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_procedural::Graph;
@@ -180,7 +180,7 @@ pub(super) fn write_graphs(path: &Path, materials: &SceneMaterials<'_>) -> Resul
         let doc = format!("{} of part '{}'", found.graph.name, part.id);
         graphs.push(Graph { doc: Some(doc), ..found.settings.as_defaults(&found.graph, &name) });
     }
-    std::fs::write(path, to_text_of_all(&graphs)).map_err(SceneError::io("write", path))?;
+    std::fs::write(path, to_text_of_all(&graphs)).map_err(FileError::io("write", path))?;
     Ok(())
 }
 

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::{check_free, is_inside};
 use mateval_dataset::{Finding, SceneId, Severity, ViewId};
 use mateval_export::mitsuba::export_view;
 use mateval_export::{ExportOptions, Exported, Format, croissant, export};
+use mateval_files::work_folder::{check_free, is_inside};
 use mateval_prep::recipe::{self, RECIPE};
 use mateval_report::publish::publish;
 use mateval_report::release::file::Day;

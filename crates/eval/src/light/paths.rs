@@ -7,8 +7,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::{Camera, Progress, Report, SceneId, TriangleMesh};
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{LinearRgb, Picture};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_tracer::{Coat, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted};

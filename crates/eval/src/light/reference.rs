@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::SCORER_JSON;
 use mateval_dataset::manifest::change_scene;
-use mateval_dataset::manifest::sha256_of_file;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_dataset::scene_cost::{Step, TimedStep};
-use mateval_dataset::work_folder::WorkFolder;
 use mateval_dataset::{Camera, Progress, Report, SceneId, json, scene_cost};
+use mateval_files::FileError;
+use mateval_files::untrusted::sha256_of_file;
+use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
 use mateval_tracer::{LightGroups, Lighting, World};
@@ -152,7 +153,7 @@ impl Maker<'_> {
             let valid = png_io::read_mask(&folder.view(&view.id).join("valid.png"))?;
             file.variance.insert(view.id.clone(), variance([&a.sum(), &b.sum()], &valid, self.scene.exposure));
             let of_view = self.folder.join(view.id.as_str());
-            std::fs::create_dir_all(&of_view).map_err(EvalError::io("create", &of_view))?;
+            std::fs::create_dir_all(&of_view).map_err(FileError::io("create", &of_view))?;
             for (group, (a, b)) in a.pictures().iter().zip(b.pictures()).enumerate() {
                 let path = of_view.join(group_file(group));
                 exr_io::write_linear(&path, &mean_in_halves(a, b), Precision::Half)?;

@@ -11,8 +11,9 @@ use mateval_metrics::Net;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use mateval_dataset::word_enum::{UnknownWord, quoted};
+use mateval_dataset::word_enum::UnknownWord;
 use mateval_dataset::{by_text, word_enum};
+use mateval_files::untrusted::quoted;
 
 /// The better direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

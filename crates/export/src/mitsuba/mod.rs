@@ -19,10 +19,11 @@ use glam::DVec3;
 use mateval_dataset::material::Material;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::{ReferenceScene, Surface};
-use mateval_dataset::work_folder::WorkFolder;
 use mateval_dataset::{Camera, Finding, SceneId, ViewId, reference};
+use mateval_files::FileError;
+use mateval_files::whole::write_whole;
+use mateval_files::work_folder::WorkFolder;
 use mateval_image::Texture;
-use mateval_image::store::write_whole;
 use mateval_tracer::RenderSettings;
 
 use self::lights::Glow;
@@ -81,7 +82,7 @@ fn write_scene(
 ) -> Result<Element, ExportError> {
     for name in ["meshes", "textures"] {
         let path = folder.join(name);
-        std::fs::create_dir(&path).map_err(ExportError::io("make", &path))?;
+        std::fs::create_dir(&path).map_err(FileError::io("make", &path))?;
     }
     let textures = scene.texture_list();
     let mut document = Element::new("scene")

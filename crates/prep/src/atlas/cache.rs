@@ -3,14 +3,12 @@
 //! Cutting and packing take most of a build's time, and the same chairs stand in many rooms. A file that is truncated,
 //! edited or of another shape is reported and not used.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 
 use mateval_dataset::TriangleMesh;
-use mateval_dataset::manifest::sha256_of_bytes;
-use mateval_dataset::work_folder::{keep_below, mark_used};
-use mateval_image::limits::read_at_most;
-use mateval_image::store::write_whole;
+use mateval_files::cache::{Cache, Key};
+use mateval_files::untrusted::sha256_of_bytes;
 
 use super::packing::{AtlasError, AtlasLayout, SizeWish};
 
@@ -26,24 +24,18 @@ const HASH_DIGITS: usize = 64;
 /// A layout, or why there is none.
 type Made = Result<AtlasLayout, AtlasError>;
 
-/// The shape of a mesh as a key: SHA-256, hex, of its vertices and triangles.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct ShapeKey(String);
-
-impl ShapeKey {
-    /// The key of a mesh's shape.
-    pub fn of(mesh: &TriangleMesh) -> Self {
-        let positions = mesh.positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
-        let triangles = mesh.triangles.iter().flatten().flat_map(|vertex| vertex.to_le_bytes());
-        let count = (mesh.positions.len() as u64).to_le_bytes();
-        Self(sha256_of_bytes(&count.into_iter().chain(positions).chain(triangles).collect::<Vec<u8>>()))
-    }
+/// The key of a mesh's shape: of its vertices and triangles.
+pub fn shape_key(mesh: &TriangleMesh) -> Key {
+    let positions = mesh.positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
+    let triangles = mesh.triangles.iter().flatten().flat_map(|vertex| vertex.to_le_bytes());
+    let count = (mesh.positions.len() as u64).to_le_bytes();
+    Key::of(&count.into_iter().chain(positions).chain(triangles).collect::<Vec<u8>>())
 }
 
 /// A folder of layouts. Several processes may use it at once.
 #[derive(Debug)]
 pub struct AtlasCache {
-    folder: PathBuf,
+    cache: Cache,
     makers_sha256: String,
     /// Faults of the cache, none of which ends a build.
     remarks: Mutex<Vec<String>>,
@@ -53,26 +45,27 @@ impl AtlasCache {
     /// The cache in this folder, which is created once a layout is kept.
     pub fn new(folder: &Path) -> Self {
         let makers_sha256 = sha256_of_bytes(MAKERS.concat().as_bytes());
-        Self { folder: folder.to_owned(), makers_sha256, remarks: Mutex::default() }
+        Self { cache: Cache::new(folder), makers_sha256, remarks: Mutex::default() }
     }
 
     /// Removes what was not used for longest until the cache is small enough, and returns every fault since the last
     /// call.
     pub fn finish(&self) -> Vec<String> {
-        if self.folder.is_dir()
-            && let Err(error) = keep_below(&self.folder, MOST_BYTES)
+        let folder = self.cache.folder();
+        if folder.is_dir()
+            && let Err(error) = self.cache.keep_below(MOST_BYTES)
         {
-            self.remark(&self.folder, format!("old atlases cannot be removed: {error}"));
+            self.remark(folder, format!("old atlases cannot be removed: {error}"));
         }
         std::mem::take(&mut self.remarks.lock().expect("nothing panics while it is held"))
     }
 
     /// What an earlier build made of this shape for this wish. `mesh` has the shape.
-    pub(super) fn read(&self, shape: &ShapeKey, wish: SizeWish, mesh: &TriangleMesh) -> Option<Made> {
-        let path = self.path(shape, wish);
-        let bytes = match read_at_most(&path, MAX_FILE_BYTES) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
+    pub(super) fn read(&self, shape: &Key, wish: SizeWish, mesh: &TriangleMesh) -> Option<Made> {
+        let key = self.key(shape, wish);
+        let path = self.cache.path(&key);
+        let bytes = match self.cache.read(&key, MAX_FILE_BYTES) {
+            Ok(bytes) => bytes?,
             Err(error) => {
                 self.remark(&path, format!("atlas not used: {error}"));
                 return None;
@@ -80,28 +73,25 @@ impl AtlasCache {
         };
         let is_own = |layout: &AtlasLayout| wish.allows(layout.size) && layout.belongs_to(mesh);
         let found = parse(&bytes).filter(|made| made.as_ref().map_or(true, is_own));
-        match found {
-            Some(_) => mark_used(&path),
-            None => self.remark(&path, "atlas not used: the file is damaged; it is made again".to_owned()),
+        if found.is_none() {
+            self.remark(&path, "atlas not used: the file is damaged; it is made again".to_owned());
         }
         found
     }
 
     /// Keeps what was made of this shape for this wish.
-    pub(super) fn keep(&self, shape: &ShapeKey, wish: SizeWish, made: &Made) {
-        let path = self.path(shape, wish);
+    pub(super) fn keep(&self, shape: &Key, wish: SizeWish, made: &Made) {
+        let key = self.key(shape, wish);
         let content = postcard::to_allocvec(made).expect("atlases are plain numbers");
         let mut bytes = sha256_of_bytes(&content).into_bytes();
         bytes.extend(content);
-        let written = std::fs::create_dir_all(&self.folder).map_err(|error| error.to_string());
-        if let Err(error) = written.and_then(|()| write_whole(&path, &bytes).map_err(|error| error.to_string())) {
-            self.remark(&path, format!("atlas cannot be kept: {error}"));
+        if let Err(error) = self.cache.keep(&key, &bytes) {
+            self.remark(&self.cache.path(&key), format!("atlas cannot be kept: {error}"));
         }
     }
 
-    fn path(&self, shape: &ShapeKey, wish: SizeWish) -> PathBuf {
-        let key = sha256_of_bytes(format!("{}\n{}\n{}", self.makers_sha256, shape.0, wish.key()).as_bytes());
-        self.folder.join(&key[..32])
+    fn key(&self, shape: &Key, wish: SizeWish) -> Key {
+        Key::of(format!("{}\n{shape}\n{}", self.makers_sha256, wish.key()).as_bytes())
     }
 
     fn remark(&self, path: &Path, what: String) {
@@ -121,6 +111,8 @@ fn parse(bytes: &[u8]) -> Option<Made> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::super::tests::cuboid;
     use super::super::{Wanted, packed, unwrap_copies};
     use super::*;
@@ -139,7 +131,7 @@ mod tests {
             unwrap_copies(&mesh, &copies, Some(&cache)).remove(0).unwrap().mesh
         };
         let first = unwrap();
-        let kept = files(&cache.folder);
+        let kept = files(cache.cache.folder());
         assert_eq!(kept.len(), 1);
         assert_eq!(unwrap(), first);
         assert_eq!(cache.finish(), Vec::<String>::new());
@@ -165,7 +157,7 @@ mod tests {
         let fewer = TriangleMesh { triangles: mesh.triangles[1..].to_vec(), ..mesh.clone() };
         let [small, large] = [256, 512].map(SizeWish::Fixed);
         let made = packed(&fewer, small);
-        let key = ShapeKey::of(&mesh);
+        let key = shape_key(&mesh);
         cache.keep(&key, small, &made);
         assert_eq!(cache.read(&key, small, &fewer), Some(made));
         assert_eq!(cache.read(&key, small, &mesh), None);

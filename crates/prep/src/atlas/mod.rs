@@ -9,7 +9,7 @@ mod packing;
 
 use mateval_dataset::TriangleMesh;
 
-use cache::{AtlasCache, ShapeKey};
+use cache::{AtlasCache, shape_key};
 use packing::packed;
 pub use packing::{AtlasError, SizeWish, Unwrapped};
 
@@ -31,7 +31,7 @@ pub fn unwrap_copies(
     copies: &[Wanted<'_>],
     cache: Option<&AtlasCache>,
 ) -> Vec<Result<Unwrapped, AtlasError>> {
-    let cache = cache.map(|cache| (cache, ShapeKey::of(shape)));
+    let cache = cache.map(|cache| (cache, shape_key(shape)));
     let unwrap_copy = |copy: &Wanted<'_>| {
         let known = cache.as_ref().and_then(|(cache, key)| cache.read(key, copy.size, shape));
         let layout = known.unwrap_or_else(|| {

@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::{Finding, Severity, json};
+use mateval_files::FileError;
 use serde::{Deserialize, Serialize};
 
 use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
@@ -126,9 +127,9 @@ pub fn bake(
     on_line: &mut dyn FnMut(&str),
 ) -> Result<Result<(PathBuf, Baked), BakeFault>, PrepError> {
     // Blender has another working folder.
-    let absolute = |path: &Path| std::path::absolute(path).map_err(PrepError::io("resolve", path));
+    let absolute = |path: &Path| std::path::absolute(path).map_err(FileError::io("resolve", path));
     let (blend, out) = (absolute(blend)?, absolute(out)?);
-    std::fs::create_dir_all(&out).map_err(PrepError::io("make", &out))?;
+    std::fs::create_dir_all(&out).map_err(FileError::io("make", &out))?;
     let script = write_scripts(&out)?.with_file_name(BAKE_SCRIPT);
     let file = blend.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let job = Job {

@@ -16,6 +16,7 @@ use mateval_dataset::material::Material;
 use mateval_dataset::reference::WrapWord;
 use mateval_dataset::reference::{LightGroup, ReferenceScene, Surface};
 use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json};
+use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -45,7 +46,7 @@ pub enum BlenderEvent<'a> {
 impl JobFolder {
     /// Writes the job into the folder, which is created if it does not exist.
     pub fn prepare(folder: &Path, plan: &JobPlan<'_>) -> Result<Self, PrepError> {
-        std::fs::create_dir_all(folder).map_err(PrepError::io("make", folder))?;
+        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         write_job(folder, plan)?;
         let script = write_scripts(folder)?;
         Ok(Self { folder: folder.to_owned(), script, groups: plan.reference.lights.len() })
@@ -78,7 +79,7 @@ impl JobFolder {
         let result = self.folder.join("result.json");
         match std::fs::remove_file(&result) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(PrepError::io("remove", &result)(error));
+                return Err(FileError::io("remove", &result)(error).into());
             }
             _ => {}
         }
@@ -233,7 +234,7 @@ pub struct JobPlan<'a> {
 fn write_job(folder: &Path, plan: &JobPlan<'_>) -> Result<(), PrepError> {
     for name in ["meshes", "textures"] {
         let path = folder.join(name);
-        std::fs::create_dir_all(&path).map_err(PrepError::io("make", path))?;
+        std::fs::create_dir_all(&path).map_err(FileError::io("make", path))?;
     }
     let surfaces = plan.reference.surfaces.iter().zip(plan.parts).enumerate();
     let surfaces = surfaces.map(|(at, (surface, parts))| write_surface(folder, at, surface, parts));
@@ -259,7 +260,7 @@ fn write_surface(folder: &Path, at: usize, surface: &Surface, parts: &[u16]) -> 
     let write = |kind: &str, bytes: Vec<u8>| {
         let name = format!("meshes/{at:05}.{kind}");
         let path = folder.join(&name);
-        std::fs::write(&path, bytes).map_err(PrepError::io("write", path)).map(|()| name)
+        std::fs::write(&path, bytes).map_err(FileError::io("write", path)).map(|()| name)
     };
     let normals = normals.as_ref().map(|all| write("normals", floats(all.iter().flat_map(|v| v.to_array()))));
     let uvs = uvs.as_ref().map(|all| write("uvs", floats(all.iter().flat_map(|v| v.to_array()))));

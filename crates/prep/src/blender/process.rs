@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use mateval_files::FileError;
+
 use crate::error::PrepError;
 
 /// Time between two looks at the running process.
@@ -88,12 +90,12 @@ pub fn run(
     limits: &BlenderLimits,
     on_line: &mut dyn FnMut(Option<&str>) -> Result<(), PrepError>,
 ) -> Result<Ended, PrepError> {
-    let io = |action| PrepError::io(action, log);
+    let io = |action| FileError::io(action, log);
     let file = File::create(log).map_err(io("write"))?;
     let other = file.try_clone().map_err(io("write"))?;
     command.stdin(Stdio::null()).stdout(file).stderr(other);
     let program = PathBuf::from(command.get_program());
-    let mut child = Running(command.spawn().map_err(PrepError::io("run", program))?);
+    let mut child = Running(command.spawn().map_err(FileError::io("run", program))?);
     let mut lines = Lines { file: File::open(log).map_err(io("read"))?, rest: String::new() };
     let start = Instant::now();
     let mut last_line = start;
@@ -225,10 +227,10 @@ const PACKAGE: &str = "mateval";
 pub fn write_scripts(folder: &Path) -> Result<PathBuf, PrepError> {
     let scripts = folder.join("scripts");
     let package = scripts.join(PACKAGE);
-    std::fs::create_dir_all(&package).map_err(PrepError::io("make", package))?;
+    std::fs::create_dir_all(&package).map_err(FileError::io("make", package))?;
     for (name, text) in SCRIPTS {
         let path = scripts.join(name);
-        std::fs::write(&path, text).map_err(PrepError::io("write", path))?;
+        std::fs::write(&path, text).map_err(FileError::io("write", path))?;
     }
     Ok(scripts.join(SCRIPTS[0].0))
 }

@@ -1,7 +1,7 @@
 //! The faults for which a scene of a recipe is refused while it is made.
 
-use mateval_dataset::source_folder::FileFault;
 use mateval_dataset::{Finding, Severity};
+use mateval_files::source_folder::FileFault;
 use mateval_image::ImageError;
 use mateval_sources::front3d::camera_sampler::CameraError;
 

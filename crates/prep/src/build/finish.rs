@@ -14,14 +14,16 @@ use std::path::Path;
 use mateval_dataset::dataset::{DatasetFile, FORMAT, PREVIOUS_FORMAT, SceneFile, Target, TargetsFile};
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS, is_rendered};
+use mateval_dataset::manifest;
 use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::manifest::change_scene;
-use mateval_dataset::manifest::{self, sha256_of_bytes, sha256_of_file};
 use mateval_dataset::open::{check_whole, read_dataset_file};
 use mateval_dataset::render_file::RENDER_FILE;
-use mateval_dataset::work_folder::{self, remove};
 use mateval_dataset::{Progress, RendererId, Report, SceneError, SceneId, json};
-use mateval_image::store::write_whole;
+use mateval_files::FileError;
+use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
+use mateval_files::whole::write_whole;
+use mateval_files::work_folder::{self, remove};
 use serde::Deserialize;
 
 use super::start::{SceneMark, is_build, settings_sha256};
@@ -155,17 +157,17 @@ fn put_in_place(root: &Path, id: &SceneId, is_wanted: bool) -> Result<(), PrepEr
         BuildFolder::of(root).note_change(id)?;
     }
     let parent = to.parent().unwrap_or(root);
-    std::fs::create_dir_all(parent).map_err(PrepError::io("make", parent))?;
-    std::fs::rename(&from, &to).map_err(PrepError::io("move", &from))
+    std::fs::create_dir_all(parent).map_err(FileError::io("make", parent))?;
+    Ok(std::fs::rename(&from, &to).map_err(FileError::io("move", &from))?)
 }
 
 /// Fails where `scenes` holds what is no scene of the dataset, such as a copy that was made by hand.
 pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepError> {
     let folder = root.join("scenes");
-    let entries = std::fs::read_dir(&folder).map_err(PrepError::io("list", &folder))?;
+    let entries = std::fs::read_dir(&folder).map_err(FileError::io("list", &folder))?;
     let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
     let is_stray =
-        |name: &String| !mateval_image::store::is_temporary(name) && scenes.iter().all(|id| id.as_str() != name);
+        |name: &String| !mateval_files::whole::is_temporary(name) && scenes.iter().all(|id| id.as_str() != name);
     let mut names: Vec<String> = names.filter(is_stray).collect();
     names.sort();
     if names.is_empty() { Ok(()) } else { Err(PrepError::StrayScenes { path: folder, names }) }
@@ -264,7 +266,7 @@ fn write(root: &Path, mut dataset: DatasetFile, known: &BTreeMap<String, String>
 /// where one of its files is not the one that is listed.
 pub fn bring_up_to_date(root: &Path, progress: Progress<'_>) -> Result<bool, PrepError> {
     let path = root.join(DATASET);
-    let bytes = std::fs::read(&path).map_err(PrepError::io("read", &path))?;
+    let bytes = std::fs::read(&path).map_err(FileError::io("read", &path))?;
     if format_of(&bytes).as_deref() != Some(PREVIOUS_FORMAT) {
         return Ok(false);
     }
@@ -357,7 +359,7 @@ impl JsonState {
 
 /// Rewrites a file that has the previous format; leaves any other.
 fn raise_file(path: &Path) -> Result<(), PrepError> {
-    let bytes = std::fs::read(path).map_err(PrepError::io("read", path))?;
+    let bytes = std::fs::read(path).map_err(FileError::io("read", path))?;
     if format_of(&bytes).as_deref() == Some(PREVIOUS_FORMAT) {
         write_whole(path, raised(path, &bytes)?.as_bytes()).map_err(SceneError::from)?;
     }

@@ -9,13 +9,15 @@ use mateval_dataset::material::{Appearance, Material};
 use mateval_dataset::mesh::UvAtlas;
 use mateval_dataset::submission::Map;
 use mateval_dataset::{Finding, Progress, Report, Severity, TriangleMesh};
+use mateval_files::FileError;
+use mateval_files::cache::Key;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{Picture, Texture, png_io};
 use rayon::prelude::*;
 
 use super::parts::InstanceEntry;
 use super::plan::Plan;
-use crate::atlas::cache::{AtlasCache, ShapeKey};
+use crate::atlas::cache::{AtlasCache, shape_key};
 use crate::atlas::{AtlasError, SizeWish, Unwrapped, Wanted, unwrap_copies};
 use crate::error::PrepError;
 
@@ -96,8 +98,8 @@ fn unwrap_all(
 fn copies_of_shapes(plan: &Plan) -> Vec<Vec<usize>> {
     let has_appearance = |at: &usize| plan.scene.materials[plan.scene.surfaces[*at].material.0].has_appearance();
     let seen: Vec<usize> = (0..plan.instances.len()).filter(has_appearance).collect();
-    let keys: Vec<ShapeKey> = seen.par_iter().map(|at| ShapeKey::of(plan.shape(*at))).collect();
-    let mut shapes: BTreeMap<ShapeKey, Vec<usize>> = BTreeMap::new();
+    let keys: Vec<Key> = seen.par_iter().map(|at| shape_key(plan.shape(*at))).collect();
+    let mut shapes: BTreeMap<Key, Vec<usize>> = BTreeMap::new();
     for (at, key) in seen.into_iter().zip(keys) {
         shapes.entry(key).or_default().push(at);
     }
@@ -212,7 +214,7 @@ fn clipped_finding(plan: &Plan, instance: &InstanceEntry, baked: &Baked) -> Opti
 
 fn write_material(folder: &SceneFolder, instance: &InstanceEntry, size: u32, baked: &Baked) -> Result<(), PrepError> {
     let path = folder.truth_material(&instance.id);
-    std::fs::create_dir_all(&path).map_err(PrepError::io("make", &path))?;
+    std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
     let [base, rough, metal] = Map::ALL.map(|map| path.join(map.stem()).with_extension("png"));
     match &baked.material {
         BakedMaterial::Constant { base_color, roughness, metallic } => {

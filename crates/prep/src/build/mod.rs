@@ -25,8 +25,9 @@ use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::reference::Surface;
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
-use mateval_dataset::work_folder::{WorkFolder, remove, remove_beside};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference};
+use mateval_files::FileError;
+use mateval_files::work_folder::{WorkFolder, remove, remove_beside};
 use mateval_sources::source_scene::LicenceText;
 
 use crate::atlas::cache::AtlasCache;
@@ -128,7 +129,7 @@ fn make_scene(
     SceneHashes::empty(&options.out, &entry.id).update()?;
     // The mark is written last, since a scene without its mark is made again.
     let marks = mark.parent().unwrap_or(&mark);
-    std::fs::create_dir_all(marks).map_err(PrepError::io("make", marks))?;
+    std::fs::create_dir_all(marks).map_err(FileError::io("make", marks))?;
     Ok(json::write(&mark, &made)?)
 }
 
@@ -217,7 +218,7 @@ fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
     let views = plan.views.iter().flat_map(|view| [folder.view(&view.id), folder.truth_view(&view.id)]);
     let geometry = folder.path().join("geometry");
     for path in views.chain([geometry]) {
-        std::fs::create_dir_all(&path).map_err(PrepError::io("make", path))?;
+        std::fs::create_dir_all(&path).map_err(FileError::io("make", path))?;
     }
     Ok(())
 }

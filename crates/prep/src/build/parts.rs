@@ -11,12 +11,12 @@ use std::num::NonZeroU16;
 use std::path::Path;
 
 use mateval_dataset::dataset::Part;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::ids::{PartIndex, id_text_from};
 use mateval_dataset::reference::{ReferenceScene, Surface};
-use mateval_dataset::source_folder::{FileFault, SourceFolder};
 use mateval_dataset::{Finding, InstanceId, InstanceIndex, PartId, PartSetId, Role, Severity, TriangleMesh};
-use mateval_sources::npy::{self, NpyError};
+use mateval_files::source_folder::{FileFault, SourceFolder};
+use mateval_files::untrusted::shortened;
+use mateval_image::npy_numbers::{self, NpyError};
 use mateval_sources::source_scene::InstanceOrigin;
 use mateval_sources::surface_mesh::{MAX_PARTS, connected_parts, parts_of_labels};
 
@@ -297,7 +297,7 @@ fn labels_of_instance(
     let triangles = mesh.triangles.len();
     let named = || file.to_owned();
     let relative = SourceFolder::relative(file)?;
-    let most = (npy::MAX_PREFIX_BYTES + npy::MAX_HEADER_BYTES + npy::MAX_NUMBER_BYTES * triangles) as u64;
+    let most = npy_numbers::max_bytes(triangles);
     match folder.path(&relative) {
         Err(fault) if fault.code == "missing_file" => return Ok(None),
         Err(fault) => return Err(fault.into()),
@@ -310,7 +310,7 @@ fn labels_of_instance(
         }
     }
     let bytes = folder.read(&relative)?;
-    let labels = npy::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: named(), source })?;
+    let labels = npy_numbers::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: named(), source })?;
     if labels.len() != triangles {
         return Err(LabelFault::Count { file: named(), found: labels.len(), expected: triangles });
     }

@@ -15,8 +15,9 @@ use mateval_dataset::material::StatedParameters;
 use mateval_dataset::material::{ClassifiedPart, MaterialClass};
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::reference::SourceMaterials;
-use mateval_dataset::source_folder::SourceFolder;
 use mateval_dataset::{Finding, SceneLights, Severity, SourceKind, TriangleMesh, ViewId};
+use mateval_files::FileError;
+use mateval_files::source_folder::SourceFolder;
 use mateval_sources::front3d::camera_rules::SamplerRules;
 use mateval_sources::front3d::camera_sampler::distance_to_anything;
 use mateval_sources::front3d::camera_sampler::score_grid;
@@ -159,7 +160,7 @@ fn part_splits(
     read: &mut SourceScene,
 ) -> Result<Vec<PartSplit>, PrepError> {
     let root = entry.root(source);
-    let mut folder = SourceFolder::new(&root, MAX_LABEL_BYTES).map_err(PrepError::io("open", &root))?;
+    let mut folder = SourceFolder::new(&root, MAX_LABEL_BYTES).map_err(FileError::io("open", &root))?;
     let (mut splits, mut faults) = (Vec::new(), Vec::new());
     for (id, labels) in &entry.part_labels {
         let own = (instances, &own);

@@ -8,8 +8,9 @@ use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel, StatedParameters, TextureIndex};
 use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
-use mateval_dataset::source_folder::SourceFolder;
 use mateval_dataset::{Progress, Report, Role, SceneLights, SourceKind, ViewId};
+use mateval_files::FileError;
+use mateval_files::source_folder::SourceFolder;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::{Encoding, read_texture};
@@ -194,13 +195,13 @@ fn blend_scene(
     read.findings.extend(baked.findings.iter().map(|finding| finding.of_file(&read.file)));
     read.findings.sort();
     let mut folder =
-        SourceFolder::new(path.parent().unwrap_or(root), u64::MAX - 1).map_err(PrepError::io("open", root))?;
+        SourceFolder::new(path.parent().unwrap_or(root), u64::MAX - 1).map_err(FileError::io("open", root))?;
     for name in std::iter::once(&read.file).chain(&baked.files) {
-        folder.read(name).map_err(|fault| PrepError::io("read", name)(std::io::Error::other(fault)))?;
+        folder.read(name).map_err(|fault| FileError::io("read", name)(std::io::Error::other(fault)))?;
     }
     let files = folder.into_files();
     (read.files, read.absent, read.missing) = (files.hashes, files.absent, Missing::default());
-    std::fs::remove_dir_all(&out).map_err(PrepError::io("remove", &out))?;
+    std::fs::remove_dir_all(&out).map_err(FileError::io("remove", &out))?;
     Ok(read)
 }
 
@@ -376,7 +377,7 @@ pub(super) fn read_photo(
 ) -> Result<Option<ScenePhoto>, PrepError> {
     let Some(path) = &entry.photo else { return Ok(None) };
     let root = entry.root(source);
-    let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(PrepError::io("open", &root))?;
+    let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
     let photo = photo_of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
     let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(SceneFault::Photo(fault)))?;
     scene.files.extend(folder.into_files().hashes);

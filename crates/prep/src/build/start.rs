@@ -9,9 +9,11 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::dataset::{Licence, SceneFile, SourceFile};
 use mateval_dataset::layout::{BUILD, BuildFolder};
 use mateval_dataset::layout::{DATASET, SceneFolder};
-use mateval_dataset::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
-use mateval_dataset::{SceneId, json, manifest};
-use mateval_sources::below::relative_below;
+use mateval_dataset::{SceneId, json};
+use mateval_files::FileError;
+use mateval_files::source_folder::relative_below;
+use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
+use mateval_files::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
 use serde::{Deserialize, Serialize};
 
 use super::parts::file_names;
@@ -109,7 +111,7 @@ fn changed_inputs(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> {
         if !path.is_file() {
             return Some(RecipeSceneFault::MissingInput { file });
         }
-        match manifest::sha256_of_file(&path) {
+        match sha256_of_file(&path) {
             Ok(found) if found == *pinned => None,
             Ok(found) => Some(RecipeSceneFault::ChangedInput { file, found, pinned: pinned.clone() }),
             Err(source) => Some(RecipeSceneFault::UnreadableInput { file, source }),
@@ -172,23 +174,23 @@ pub(super) fn begin(
     // Before the lease, which is a file in the folder.
     check_place(options, Place::of(out))?;
     let build = BuildFolder::of(out);
-    std::fs::create_dir_all(build.path()).map_err(PrepError::io("make", build.path()))?;
+    std::fs::create_dir_all(build.path()).map_err(FileError::io("make", build.path()))?;
     let _lease = build.lease_of_start()?;
     let place = Place::of(out);
     check_place(options, place)?;
     if place == Place::Build && (!options.force || !options.scenes.is_empty()) {
         check_scenes(options, recipe, tool, source)?;
-        return Ok(mateval_image::store::write_whole(&build.recipe(), text.as_bytes())?);
+        return Ok(mateval_files::whole::write_whole(&build.recipe(), text.as_bytes())?);
     }
     if place != Place::New {
         check_holds_none(out, &[&options.recipe, source])?;
         let _whole = build.lease_of_all()?;
         let old = put_aside(out)?;
-        std::fs::create_dir_all(build.path()).map_err(PrepError::io("make", build.path()))?;
+        std::fs::create_dir_all(build.path()).map_err(FileError::io("make", build.path()))?;
         old.as_deref().map_or(Ok(()), remove)?;
     }
     remove_abandoned(out)?;
-    mateval_image::store::write_whole(&build.recipe(), text.as_bytes())?;
+    mateval_files::whole::write_whole(&build.recipe(), text.as_bytes())?;
     json::write(&build.key(), &BuildKey { format: KEY_FORMAT.to_owned() })?;
     Ok(())
 }
@@ -268,7 +270,7 @@ pub(super) fn finished_scene(root: &Path, entry: &RecipeScene, source: &Path) ->
     let mark: SceneMark = json::read(&BuildFolder::of(root).mark(&entry.id)).ok()?;
     let scene: SceneFile = json::read(&SceneFolder::of(root, &entry.id).scene_file()).ok()?;
     let root = entry.root(source);
-    let is_same = |file: &SourceFile| manifest::sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
+    let is_same = |file: &SourceFile| sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
     let is_absent = |file: &String| !root.join(file).exists();
     let same = scene.source.files.iter().all(is_same) && mark.absent.iter().all(is_absent);
     (same && mark.labels == label_files(entry, source)).then_some(mark)
@@ -304,7 +306,7 @@ pub(crate) fn settings_sha256(recipe: &Recipe, id: &SceneId, tool: &str) -> Stri
     let settings = format!(
         "{tool}\n{resolution:?}\n{views:?}\n{wide:?}\n{atlas_size:?}\n{materials:?}\n{camera_rules}\n{entry:?}"
     );
-    manifest::sha256_of_bytes(settings.as_bytes())
+    sha256_of_bytes(settings.as_bytes())
 }
 
 #[cfg(test)]

@@ -28,8 +28,8 @@ use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::render_file;
 use mateval_dataset::render_file::RENDER_FILE;
 use mateval_dataset::render_file::{CompareCounts, VERDICT_FORMAT};
-use mateval_dataset::work_folder::{WorkFolder, check_free, is_inside};
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
+use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Psnr;
 use mateval_tracer::World;
@@ -106,7 +106,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     }
     if let Some(work) = work {
         json::write(&work.path().join(COMPARE), &file)?;
-        mateval_image::store::write_whole(&work.path().join("index.html"), page::page(&file, &previews).as_bytes())?;
+        mateval_files::whole::write_whole(&work.path().join("index.html"), page::page(&file, &previews).as_bytes())?;
         work.finish()?;
     }
     Ok(file)

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::ViewId;
 use mateval_dataset::dataset::SceneFile;
+use mateval_files::{FileError, untrusted};
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Normal, Picture};
@@ -133,7 +134,7 @@ impl ViewPreviews {
     pub(super) fn new(out: &Path, scene: &SceneFile, view: &ViewId) -> Result<Self, PrepError> {
         let folder = format!("pictures/{}/{view}", scene.id);
         let place = out.join(&folder);
-        std::fs::create_dir_all(&place).map_err(PrepError::io("make", &place))?;
+        std::fs::create_dir_all(&place).map_err(FileError::io("make", &place))?;
         let (out, view) = (out.to_owned(), view.to_string());
         Ok(Self { out, folder, exposure: scene.exposure, view, rows: Vec::new() })
     }
@@ -169,7 +170,7 @@ impl ViewPreviews {
 
     /// The factor of a picture of light in its preview, and the note that states it.
     fn gain(&self, light: &LightComparison, level: f64) -> (f64, String) {
-        match light.light.as_ref().map(|name| crate::stats::shown(name, 60)) {
+        match light.light.as_ref().map(|name| untrusted::shown(name, 60)) {
             None => (self.exposure, "mean of both halves, with the scene's exposure".to_owned()),
             Some(name) if level > 0.0 => (GROUP_MEAN / level, format!("{name}, times {:.3}", GROUP_MEAN / level)),
             Some(name) => (1.0, format!("{name}, black")),

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use crate::render::MAX_BOUNCES;
 use mateval_dataset::dataset::View;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::{Camera, Progress, Report, SceneId, json};
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};

@@ -1,6 +1,7 @@
 //! Shows the comparison as tables, whose numbers are rounded while the JSON has all digits.
 
 use mateval_dataset::progress::{Table, row};
+use mateval_files::untrusted;
 
 use super::file::{Check, CompareFile, LightComparison, Quantity, SceneComparison, State, ViewComparison};
 
@@ -121,7 +122,7 @@ fn state(view: &ViewComparison, light: &LightComparison) -> State {
 
 fn name(light: &LightComparison) -> String {
     match &light.light {
-        Some(name) => format!("{} {}", light.picture, crate::stats::shown(name, 24)),
+        Some(name) => format!("{} {}", light.picture, untrusted::shown(name, 24)),
         None => light.picture.clone(),
     }
 }

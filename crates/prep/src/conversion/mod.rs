@@ -224,7 +224,7 @@ impl Converter<'_> {
             severity,
             code,
             self.file,
-            format!("material '{}'", mateval_dataset::findings::shortened(&material.name)),
+            format!("material '{}'", mateval_files::untrusted::shortened(&material.name)),
             message,
             action,
         ));

@@ -17,8 +17,9 @@ use mateval_dataset::glb::{self, GlbNode};
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, part_picture};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::ReferenceScene;
-use mateval_dataset::work_folder::{WorkFolder, check_holds_none};
 use mateval_dataset::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
+use mateval_files::FileError;
+use mateval_files::work_folder::{WorkFolder, check_holds_none};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
@@ -101,9 +102,9 @@ pub fn perturb(
 fn copy(from: &Path, to: &Path, file: &str) -> Result<(), PrepError> {
     let place = to.join(file);
     if let Some(folder) = place.parent() {
-        std::fs::create_dir_all(folder).map_err(PrepError::io("make", folder))?;
+        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
     }
-    std::fs::copy(from.join(file), &place).map(|_| ()).map_err(PrepError::io("write", &place))
+    Ok(std::fs::copy(from.join(file), &place).map(|_| ()).map_err(FileError::io("write", &place))?)
 }
 
 /// What happened to a scene.
@@ -158,7 +159,7 @@ fn write_scene(
     }
     // The meshes.
     let folder = to.path().join("geometry");
-    std::fs::create_dir_all(&folder).map_err(PrepError::io("make", &folder))?;
+    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
     let motion_of = |id: &InstanceId| {
         let at = scene.instances.iter().position(|instance| instance.id == *id);
         at.and_then(|at| motions[at].as_ref())
@@ -243,7 +244,7 @@ fn write_pictures(
         note_nearest(&geometry, &mut nearest[usize::from(at > 0)]);
         unseen_shares.push(unseen_share(&geometry));
         let shown = to.view(&view.id);
-        std::fs::create_dir_all(&shown).map_err(PrepError::io("make", &shown))?;
+        std::fs::create_dir_all(&shown).map_err(FileError::io("make", &shown))?;
         write_geometry(to, &view.id, &geometry)?;
         write_parts(&shown, &geometry, &parts)?;
     }

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec3};
 use mateval_dataset::dataset::PerturbationKind;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::{InstanceId, SceneId, TriangleMesh, splitmix64};
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_tracer::{Accel, Ray, TracerError};
 
 /// How far a level moves every piece of furniture.

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use mateval_dataset::findings::shortened;
-use mateval_dataset::{PartSetId, SceneError, SceneId, ViewId};
-use mateval_sources::below::BelowError;
+use mateval_dataset::{PartSetId, SceneId, ViewId};
+use mateval_files::FileError;
+use mateval_files::source_folder::BelowError;
+use mateval_files::untrusted::shortened;
 
 /// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers
 /// are centimetres apart.
@@ -128,7 +129,7 @@ pub enum RecipeSceneFault {
     #[error("input '{file}' does not exist, or is not an ordinary file")]
     MissingInput { file: String },
     #[error("input '{file}' cannot be hashed: {source}")]
-    UnreadableInput { file: String, source: SceneError },
+    UnreadableInput { file: String, source: FileError },
     #[error("input '{file}' has the hash {found}, expected {pinned}; get the file that the release was made of")]
     ChangedInput { file: String, found: String, pinned: String },
 }

@@ -11,8 +11,8 @@ use std::path::Path;
 
 use mateval_dataset::ViewId;
 use mateval_dataset::dataset::TrueMaterials;
-use mateval_image::limits::read_at_most;
-use mateval_image::limits::{hint, mistaken_for, without_mark};
+use mateval_files::FileError;
+use mateval_files::untrusted::{hint, mistaken_for, read_at_most, without_mark};
 use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
@@ -243,16 +243,16 @@ const MAX_BYTES: u64 = 16 << 20;
 
 /// The text of an ordinary file of at most [`MAX_BYTES`].
 pub(crate) fn read_text(path: &Path) -> Result<String, PrepError> {
-    let bytes = read_at_most(path, MAX_BYTES).map_err(PrepError::io("read", path))?;
+    let bytes = read_at_most(path, MAX_BYTES).map_err(FileError::io("read", path))?;
     let not_text = |_| {
         let message = format!("expected UTF-8, found other bytes{}", hint(&bytes));
         std::io::Error::new(std::io::ErrorKind::InvalidData, message)
     };
-    let text = std::str::from_utf8(without_mark(&bytes)).map_err(not_text).map_err(PrepError::io("read", path))?;
+    let text = std::str::from_utf8(without_mark(&bytes)).map_err(not_text).map_err(FileError::io("read", path))?;
     // Text of another kind, such as a Git LFS pointer. TOML may begin like one, as in `#usda`.
     if mistaken_for(&bytes).is_some() && text.parse::<toml::Table>().is_err() {
         let message = format!("expected TOML, found another file{}", hint(&bytes));
-        return Err(PrepError::io("read", path)(std::io::Error::new(std::io::ErrorKind::InvalidData, message)));
+        return Err(FileError::io("read", path)(std::io::Error::new(std::io::ErrorKind::InvalidData, message)).into());
     }
     Ok(text.to_owned())
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::source_folder::SourceFolder;
 use mateval_dataset::{PartSetId, SceneId};
+use mateval_files::source_folder::SourceFolder;
 use mateval_sources::front3d::AppearanceRule;
 use serde::Deserialize;
 

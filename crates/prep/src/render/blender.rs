@@ -14,6 +14,7 @@ use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::render_file::RenderFile;
 use mateval_dataset::render_file::RenderNoise;
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, reference};
+use mateval_files::FileError;
 
 use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
 use crate::blender::{
@@ -109,7 +110,7 @@ impl BlenderScene<'_> {
         }
         let work = self.run.root.join(WORK).join(self.id.as_str());
         if work.exists() {
-            std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?;
+            std::fs::remove_dir_all(&work).map_err(FileError::io("remove", &work))?;
         }
         let reference = reference::read(&folder)?;
         let parts = scene_meshes::part_values(&folder, &scene)?;
@@ -132,7 +133,7 @@ impl BlenderScene<'_> {
             report.remarks.push(format!("scene '{}': attempt {attempt} failed: {}", self.id, failure.what));
         }
         match failure {
-            None => std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?,
+            None => std::fs::remove_dir_all(&work).map_err(FileError::io("remove", &work))?,
             Some(failure) => report.failures.push(self.finding(failure)),
         }
         Ok(report)

@@ -8,10 +8,11 @@ use std::str::FromStr;
 use mateval_dataset::dataset::View;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::manifest::change_scene;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
 use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json};
+use mateval_files::FileError;
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
 
@@ -165,10 +166,10 @@ pub(super) fn write_view(
     exposure: f64,
     file: &RenderFile,
 ) -> Result<(), PrepError> {
-    std::fs::create_dir_all(place).map_err(PrepError::io("make", place))?;
+    std::fs::create_dir_all(place).map_err(FileError::io("make", place))?;
     let mark = place.join(RENDER_FILE);
     if mark.exists() {
-        std::fs::remove_file(&mark).map_err(PrepError::io("remove", &mark))?;
+        std::fs::remove_file(&mark).map_err(FileError::io("remove", &mark))?;
     }
     let light = |name: &str, picture: &Picture<LinearRgb>| {
         exr_io::write_linear(&place.join(format!("{name}.exr")), picture, Precision::Float)
@@ -213,11 +214,11 @@ pub(crate) fn show_input(folder: &SceneFolder, renderer: &RendererId) -> Result<
         return Ok(());
     }
     for name in ["rgb.exr", "rgb.png"] {
-        let bytes = std::fs::read(from.join(name)).map_err(PrepError::io("read", from.join(name)))?;
+        let bytes = std::fs::read(from.join(name)).map_err(FileError::io("read", from.join(name)))?;
         if std::fs::read(to.join(name)).is_ok_and(|found| found == bytes) {
             continue;
         }
-        mateval_image::store::write_whole(&to.join(name), &bytes)?;
+        mateval_files::whole::write_whole(&to.join(name), &bytes)?;
     }
     Ok(())
 }

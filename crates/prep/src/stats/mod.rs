@@ -345,21 +345,6 @@ fn repeats<'a>(file: &str, list: &str, key: &str, ids: impl Iterator<Item = &'a 
         .collect()
 }
 
-/// An untrusted name, made safe to print: one line of at most `most` characters, without characters that control a
-/// terminal or reverse the direction of the text.
-pub(crate) fn shown(name: &str, most: usize) -> String {
-    let is_control = |c: char| {
-        c.is_control()
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
-            || (c as u32) & 0xfffe == 0xfffe
-    };
-    let whole: Vec<char> = name.chars().take(most + 1).map(|c| if is_control(c) { '\u{fffd}' } else { c }).collect();
-    match whole.len() > most {
-        true => whole[..most - 1].iter().collect::<String>() + "…",
-        false => whole.into_iter().collect(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use mateval_dataset::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile, TrueMaterials};

@@ -7,11 +7,12 @@
 use mateval_dataset::Severity;
 use mateval_dataset::dataset::SUPER_CATEGORIES;
 use mateval_dataset::progress::{Table, row};
+use mateval_files::untrusted::shown;
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use super::{CategoryCount, Counts, SceneStats, Spread, StatsFile, SuperCategoryCount, shown};
+use super::{CategoryCount, Counts, SceneStats, Spread, StatsFile, SuperCategoryCount};
 
 /// Length of the longest name that is printed in full, in characters.
 const LONGEST_CELL: usize = 60;

@@ -8,10 +8,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SourceFile;
-use mateval_dataset::lease::{self, Lease};
-use mateval_dataset::manifest::{sha256_of_bytes, sha256_of_file};
-use mateval_dataset::work_folder::{WorkFolder, check_free, remove, remove_beside};
 use mateval_dataset::{FindingCount, SceneError, ids, json};
+use mateval_files::FileError;
+use mateval_files::lease::{self, Lease};
+use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
+use mateval_files::work_folder::{WorkFolder, check_free, remove, remove_beside};
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_sources::front3d::{self, AppearanceRule, FurnishedHouse, HouseFiles};
 use serde::{Deserialize, Serialize};
@@ -174,7 +175,7 @@ impl SurveyFolder {
         folder.check_place(force)?;
         let work = folder.0.join(WORK);
         for path in [folder.parts(), folder.0.join(THUMBNAILS)] {
-            std::fs::create_dir_all(&path).map_err(PrepError::io("make", &path))?;
+            std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
         }
         json::write(&work.join("key.json"), &WorkKey { format: KEY_FORMAT.to_owned() })?;
         Ok(folder)
@@ -225,7 +226,7 @@ impl SurveyFolder {
         let lease = Lease::take(&self.lease("whole"), "the survey")?;
         let entries = std::fs::read_dir(self.lease("houses")).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        for name in names.filter(|name| !mateval_image::store::is_temporary(name)) {
+        for name in names.filter(|name| !mateval_files::whole::is_temporary(name)) {
             lease::check_free(&self.lease(&format!("houses/{name}")), &format!("house '{name}'"))?;
         }
         Ok(lease)
@@ -245,7 +246,7 @@ impl SurveyFolder {
     /// Removes what was found in houses that are no longer searched.
     pub(super) fn keep_only(&self, houses: &[HouseName]) -> Result<(), PrepError> {
         let parts = self.parts();
-        let entries = std::fs::read_dir(&parts).map_err(PrepError::io("list", &parts))?;
+        let entries = std::fs::read_dir(&parts).map_err(FileError::io("list", &parts))?;
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             let Some(house) = name.strip_suffix(".json").map(|name| HouseName(name.to_owned())) else { continue };

@@ -21,7 +21,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::{Progress, Report};
-use mateval_sources::below::{common_folder, relative_below};
+use mateval_files::FileError;
+use mateval_files::source_folder::{common_folder, relative_below};
 
 use crate::error::PrepError;
 use house::{HouseName, HouseSearch, SurveyFolder, shown};
@@ -110,7 +111,7 @@ fn given_paths(options: &SurveyOptions) -> impl Iterator<Item = &PathBuf> {
 fn relative_to(source: &Path, options: &SurveyOptions) -> Result<SurveyOptions, PrepError> {
     let relative = |path: &PathBuf| {
         let chosen = options.source.is_none() && source != Path::new(HERE);
-        let path = if chosen { std::path::absolute(path).map_err(PrepError::io("find", path))? } else { path.clone() };
+        let path = if chosen { std::path::absolute(path).map_err(FileError::io("find", path))? } else { path.clone() };
         Ok::<_, PrepError>(relative_below(&path, source)?)
     };
     Ok(SurveyOptions {
@@ -132,10 +133,10 @@ pub(super) fn house_files(options: &SurveyOptions, source: &Path) -> Result<Vec<
             files.push(path.clone());
             continue;
         }
-        let entries = std::fs::read_dir(&at).map_err(PrepError::io("list", &at))?;
+        let entries = std::fs::read_dir(&at).map_err(FileError::io("list", &at))?;
         let mut names = Vec::new();
         for entry in entries {
-            names.push(path.join(entry.map_err(PrepError::io("list", &at))?.file_name()));
+            names.push(path.join(entry.map_err(FileError::io("list", &at))?.file_name()));
         }
         names.retain(|name| name.extension().is_some_and(|e| e == "json"));
         names.sort();

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SourceFile;
 use mateval_dataset::json;
-use mateval_image::store::write_whole;
+use mateval_files::whole::write_whole;
 use minijinja::value::Serde;
 use minijinja::{Environment, context};
 use serde::Serialize;

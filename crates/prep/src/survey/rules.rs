@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::manifest;
-use mateval_image::limits::read_at_most;
+use mateval_files::FileError;
+use mateval_files::untrusted::{read_at_most, sha256_of_bytes};
 use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
@@ -61,7 +61,7 @@ impl SurveyOptions {
         let Self { camera_rules, seed, cameras_per_room, resolution, fov_y_deg, only: _, goal: _, .. } = self;
         let files = format!("{models:?}\n{textures:?}\n{cameras:?}\n{rules:?}\n{lists:?}");
         let cameras = format!("{camera_rules}\n{seed}\n{cameras_per_room}\n{resolution:?}\n{fov_y_deg:?}");
-        manifest::sha256_of_bytes(format!("{tool}\n{SURVEY_FORMAT}\n{files}\n{cameras}").as_bytes())
+        sha256_of_bytes(format!("{tool}\n{SURVEY_FORMAT}\n{files}\n{cameras}").as_bytes())
     }
 }
 
@@ -198,7 +198,7 @@ const MAX_ROWS: usize = 1_000_000;
 impl RejectionLists {
     /// Adds a CSV file of rows `id,reason`. The reason is optional; lines that begin with `#` are comments.
     pub fn add(&mut self, path: &Path) -> Result<(), PrepError> {
-        let rows = read_at_most(path, MAX_LIST_BYTES).map_err(PrepError::io("read", path))?;
+        let rows = read_at_most(path, MAX_LIST_BYTES).map_err(FileError::io("read", path))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut reader =
             csv::ReaderBuilder::new().has_headers(false).flexible(true).comment(Some(b'#')).from_reader(&*rows);

@@ -16,6 +16,7 @@ use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::open::{absent_scenes, is_below};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
+use mateval_files::untrusted::sha256_of_file;
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
 
@@ -105,7 +106,7 @@ fn is_withheld(root: &Path, finding: &Finding) -> bool {
 }
 
 fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
-    match manifest::sha256_of_file(&root.join(MANIFEST)) {
+    match sha256_of_file(&root.join(MANIFEST)) {
         Ok(found) if found != dataset.manifest_sha256 => {
             let message = format!("'{}', but the SHA-256 of MANIFEST.sha256 is '{found}'", dataset.manifest_sha256);
             faults.add("wrong_manifest", DATASET, "/manifest_sha256", message);

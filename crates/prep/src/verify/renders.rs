@@ -7,10 +7,10 @@ use std::path::Path;
 use crate::scene_meshes::Faults;
 use mateval_dataset::dataset::{DatasetFile, Photo, SceneFile};
 use mateval_dataset::layout::{INPUT, SCORER_JSON, SceneFolder};
-use mateval_dataset::manifest::sha256_of_file;
 use mateval_dataset::render_file::RenderFile;
 use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_dataset::{Finding, RendererId, Severity, json};
+use mateval_files::untrusted::sha256_of_file;
 use mateval_image::{LinearRgb, exr_io};
 
 use super::scene::check_schema;
@@ -157,6 +157,7 @@ mod tests {
 
     use mateval_dataset::dataset::FORMAT;
     use mateval_dataset::{RendererId, manifest};
+    use mateval_files::untrusted::sha256_of_bytes;
 
     use super::*;
 
@@ -204,7 +205,7 @@ mod tests {
             seeds: Default::default(),
             lights: vec!["lamp".to_owned()],
             variance: BTreeMap::new(),
-            files: [("input/group_00.exr".to_owned(), manifest::sha256_of_bytes(b"light"))].into(),
+            files: [("input/group_00.exr".to_owned(), sha256_of_bytes(b"light"))].into(),
         };
         json::write(&folder.scorer().join(SCORER_JSON), &file).unwrap();
         assert_eq!(found(&dataset), [""; 0]);

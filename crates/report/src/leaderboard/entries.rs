@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::manifest::sha256_of_file;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, SceneError, Severity, json};
 use mateval_eval::EvalError;
 use mateval_eval::result::key::{Region, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
 use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
+use mateval_files::FileError;
+use mateval_files::untrusted::{sha256_of_file, shortened};
 use mateval_submission::lint::submission_json::check_method_name;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -314,7 +314,7 @@ fn entries_of(folder: &Path) -> Result<Vec<(PathBuf, std::fs::FileType)>, SceneE
         Ok((entry.path(), entry.file_type()?))
     };
     let all = folder.read_dir().and_then(|entries| entries.map(entry).collect());
-    all.map_err(SceneError::io("list", folder))
+    Ok(all.map_err(FileError::io("list", folder))?)
 }
 
 /// The path, if it is a regular file's.

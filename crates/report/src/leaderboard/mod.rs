@@ -24,8 +24,8 @@ mod site;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use mateval_dataset::work_folder::{WorkFolder, check_free};
 use mateval_dataset::{Progress, Report};
+use mateval_files::work_folder::{WorkFolder, check_free};
 
 use self::board::Board;
 pub use self::entries::{LeaderboardPlan, Submissions};
@@ -101,9 +101,9 @@ mod tests {
     //! A small site of invented results; tests in a browser are in `tests/site`.
 
     use mateval_dataset::json;
-    use mateval_dataset::manifest::sha256_of_file;
     use mateval_dataset::submission::Cost;
     use mateval_eval::result::{ResultFile, TracerCheck};
+    use mateval_files::untrusted::sha256_of_file;
     use mateval_image::{Picture, png_io};
 
     use super::entries::{Verified, verification_of};

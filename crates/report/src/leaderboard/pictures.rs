@@ -8,9 +8,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::{Progress, Report, SceneError, SceneId, ViewId};
+use mateval_dataset::{Progress, Report, SceneId, ViewId};
 use mateval_eval::open_scene::scored_views;
 use mateval_eval::result::key::PictureKind;
+use mateval_files::FileError;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, SrgbRgb, png_io};
 use mateval_submission::prediction::HashedFiles;
@@ -125,7 +126,7 @@ fn write(plan: &StripPlan<'_>, names: &[&str], scene: &SceneFile, progress: Prog
             let write = |method: &str, kind: &str, picture: &Picture<[u8; 3]>| -> Result<(), ReportError> {
                 let path = place(plan.out, method, &scene.id, &view.id, kind);
                 let folder = path.parent().unwrap_or(plan.out);
-                std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+                std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
                 Ok(png_io::write_rgb_bytes(&path, picture)?)
             };
             for (method, picture) in std::iter::once(&TRUTH).chain(names).zip(&row.shown) {
@@ -185,10 +186,10 @@ impl PictureSet {
     pub(super) fn copy(&self, from: &Path, to: &Path) -> Result<(), ReportError> {
         for ([method, scene, view], kinds) in &self.kinds {
             let folder = Path::new(method).join(scene).join(view);
-            std::fs::create_dir_all(to.join(&folder)).map_err(SceneError::io("make", &to.join(&folder)))?;
+            std::fs::create_dir_all(to.join(&folder)).map_err(FileError::io("make", &to.join(&folder)))?;
             for kind in kinds {
                 let file = folder.join(format!("{kind}.png"));
-                std::fs::copy(from.join(&file), to.join(&file)).map_err(SceneError::io("copy", &from.join(&file)))?;
+                std::fs::copy(from.join(&file), to.join(&file)).map_err(FileError::io("copy", &from.join(&file)))?;
             }
         }
         Ok(())
@@ -213,7 +214,7 @@ fn pngs(path: &Path) -> Result<BTreeSet<String>, ReportError> {
 }
 
 fn entries(path: &Path) -> Result<Vec<(String, std::fs::FileType)>, ReportError> {
-    let io = |source| SceneError::io("read", path)(source);
+    let io = |source| FileError::io("read", path)(source);
     let mut found = Vec::new();
     for entry in std::fs::read_dir(path).map_err(io)? {
         let entry = entry.map_err(io)?;

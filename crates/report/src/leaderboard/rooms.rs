@@ -10,11 +10,12 @@ use std::path::Path;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::submission::{MAP_SIZES, Map};
-use mateval_dataset::{InstanceId, Progress, Report, SceneError, SceneId};
+use mateval_dataset::{InstanceId, Progress, Report, SceneId};
 use mateval_eval::truth::true_material;
-use mateval_image::limits::read_at_most;
+use mateval_files::FileError;
+use mateval_files::untrusted::read_at_most;
+use mateval_files::whole::write_whole;
 use mateval_image::png_io::jpeg_bytes;
-use mateval_image::store::write_whole;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, Texture};
 use mateval_submission::atlas::AtlasMeshes;
@@ -81,13 +82,13 @@ fn write_room(
     folder: &Path,
 ) -> Result<Room, ReportError> {
     let geometry = from.dataset.folder(&scene.id).instances();
-    let io = |source| SceneError::io("read", &geometry)(source);
+    let io = |source| FileError::io("read", &geometry)(source);
     let bytes = std::fs::metadata(&geometry).map_err(io)?.len();
     if bytes > MOST_GEOMETRY_BYTES {
         let [mebibytes, most_mebibytes] = [bytes, MOST_GEOMETRY_BYTES].map(|bytes| bytes.div_ceil(1 << 20));
         return Ok(Room::TooLarge { mebibytes, most_mebibytes });
     }
-    std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+    std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
     let script = |name: &str, text: String| write_whole(&folder.join(format!("{name}.js")), text.as_bytes());
     let glb = base64::encode(read_at_most(&geometry, MOST_GEOMETRY_BYTES).map_err(io)?);
     let camera = scene.view(INPUT).map(|view| &view.camera);

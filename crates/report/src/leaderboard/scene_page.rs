@@ -250,7 +250,7 @@ fn viewer() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mateval_dataset::manifest::sha256_of_bytes;
+    use mateval_files::untrusted::sha256_of_bytes;
 
     /// The README beside it states the version and the hash of the viewer, which carries its licence.
     #[test]

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::SceneError;
-use mateval_image::store::write_whole;
+use mateval_files::FileError;
+use mateval_files::whole::write_whole;
 use minijinja::value::{Serde, Value};
 use minijinja::{AutoEscape, Environment, context};
 use serde::Serialize;
@@ -118,7 +118,7 @@ impl<'a> SiteWriter<'a> {
     pub(super) fn file(&self, file: &str, text: &str) -> Result<(), ReportError> {
         let path = self.path(file);
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+            std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         }
         Ok(write_whole(&path, text.as_bytes())?)
     }

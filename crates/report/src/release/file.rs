@@ -172,7 +172,7 @@ pub struct Day(String);
 
 /// A text that is not a day.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{}' is not a day; expected one as in 2026-11-24", mateval_dataset::findings::shortened(.0))]
+#[error("'{}' is not a day; expected one as in 2026-11-24", mateval_files::untrusted::shortened(.0))]
 pub struct BadDay(String);
 
 impl FromStr for Day {

@@ -12,6 +12,7 @@ use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
 use mateval_eval::EvalError;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_files::FileError;
 use mateval_prep::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -147,7 +148,7 @@ fn is_json(path: &Path) -> bool {
 
 /// The entries of a folder, sorted.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
-    let io = || SceneError::io("list", folder);
+    let io = || FileError::io("list", folder);
     let entries = std::fs::read_dir(folder).map_err(io())?;
     let mut paths: Vec<PathBuf> =
         entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>().map_err(io())?;
@@ -334,7 +335,7 @@ fn fitting<T>(
 pub(crate) fn foreign(path: &Path, manifest: &str, dataset: &Dataset) -> Option<Finding> {
     let ours = &dataset.file.manifest_sha256;
     let message = || {
-        let found = mateval_dataset::findings::shortened(manifest);
+        let found = mateval_files::untrusted::shortened(manifest);
         format!("it is about the dataset with manifest '{found}', and this one has '{ours}'")
     };
     (manifest != ours).then(|| unfit(path, "/dataset/manifest_sha256", message()))

@@ -25,9 +25,9 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::work_folder::{WorkFolder, check_free, check_holds_none, is_inside};
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
-use mateval_image::store::write_whole;
+use mateval_files::whole::write_whole;
+use mateval_files::work_folder::{WorkFolder, check_free, check_holds_none, is_inside};
 use mateval_prep::{stats, verify};
 
 pub use file::{Publication, ReleaseFile};

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::dataset::{DatasetFile, SceneFile};
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::render_file::ScorerFile;
 use mateval_dataset::{SceneId, json};
 use mateval_eval::light::reference::RELEASE_SAMPLES;
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_prep::recipe::{self, RECIPE};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -7,9 +7,10 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
-use mateval_dataset::{RendererId, SceneError, SceneId, ViewId, json};
+use mateval_dataset::{RendererId, SceneId, ViewId, json};
+use mateval_files::FileError;
+use mateval_files::whole::write_whole;
 use mateval_image::png_io::jpeg_bytes;
-use mateval_image::store::write_whole;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_prep::render::RendererKind;
@@ -156,7 +157,7 @@ pub(crate) fn write_thumbnail(
     let file = format!("{PICTURES}/{}.jpg", scene.id);
     let place = out.join(&file);
     let folder = place.parent().unwrap_or(out);
-    std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+    std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
     write_whole(&place, &jpeg)?;
     Ok(Some(Thumbnail { file, width: small.width(), height: small.height() }))
 }

@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DVec2, DVec3};
+use mateval_files::FileError;
 use mateval_image::png_io::write_rgba_bytes;
 use serde_json::{Map, Value, json};
 
@@ -322,29 +323,20 @@ fn field_uvs(model: &Model) -> Vec<impl Fn(DVec2) -> DVec2 + use<>> {
 /// Why the built-in scenes could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum SampleError {
-    /// An operation of the file system failed.
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// The operation, as in "read" or "write".
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FileError),
     /// A picture could not be written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
 }
 
-fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> SampleError {
-    let path = path.to_owned();
-    move |source| SampleError::Io { action, path, source }
-}
-
 pub(crate) fn create_folder(path: &Path) -> Result<(), SampleError> {
-    std::fs::create_dir_all(path).map_err(io("create", path))
+    std::fs::create_dir_all(path).map_err(FileError::io("create", path))?;
+    Ok(())
 }
 
 /// Writes `text` to `path`, replacing a file of that name.
 pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), SampleError> {
-    std::fs::write(path, text).map_err(io("write", path))
+    std::fs::write(path, text).map_err(FileError::io("write", path))?;
+    Ok(())
 }

@@ -2,12 +2,12 @@
 //! one scatters light, with Mitsuba's defaults for absent parameters and the indices of refraction that Mitsuba knows
 //! by name.
 
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::{
     BumpMap, ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour,
     ScalarInput, StatedParameters,
 };
 use mateval_dataset::reference::MaterialIndex;
+use mateval_files::untrusted::shortened;
 
 use super::color::ColorUse;
 use super::document::Element;

@@ -4,9 +4,8 @@
 //! Spectra become linear Rec. 709 as in Mitsuba 3.9.1's RGB mode: the CIE 1931 observer sees a reflectance under D65,
 //! and an emission as it is.
 
-use mateval_dataset::findings::shortened;
-use mateval_dataset::source_folder::SourceFolder;
-use mateval_image::limits::without_mark;
+use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::{shortened, without_mark};
 
 use super::document::{Element, ValueError};
 use super::reader::{number, number_within, numbers, triple};

@@ -3,9 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_dataset::findings::shortened;
-use mateval_dataset::source_folder::SourceFolder;
-use mateval_image::limits::{hint, without_mark};
+use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::{hint, shortened, without_mark};
 
 use crate::source_scene::Log;
 

@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3};
 use hw_skymodel::rgb::{SkyParams, SkyState};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::{ColorInput, TextureIndex};
 use mateval_dataset::reference::{Emission, EmissionMap, LightGroup, SurfaceIndex};
+use mateval_files::untrusted::shortened;
 use mateval_image::{Texels, Texture, Wrap};
 
 use super::color::{CIE_Y_INTEGRAL, ColorUse, black_body, rec709_from_xyz};

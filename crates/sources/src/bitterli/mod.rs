@@ -24,10 +24,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, Finding};
-use mateval_image::limits::{hint, without_mark};
+use mateval_files::untrusted::{hint, shortened, without_mark};
 
 use crate::coincident;
 use crate::error::{InvalidSource, SourceError, open};

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DMat4, DVec3};
 use mateval_dataset::Severity;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::{StatedParameters, TextureIndex};
 use mateval_dataset::reference::{LightGroup, MaterialIndex, ReferenceScene};
-use mateval_dataset::source_folder::{FileFault, SourceFolder};
+use mateval_files::source_folder::{FileFault, SourceFolder};
+use mateval_files::untrusted::shortened;
 
 use super::document::{Element, Ids, Limits, ValueError};
 use crate::source_scene::{Log, UniqueNames};

@@ -1,8 +1,8 @@
 //! Sensors. Mitsuba's camera looks along +z with +x to the left, MatEval's along -z with +x to the right.
 
 use glam::{DMat3, DMat4, DVec3};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::{Camera, Intrinsics};
+use mateval_files::untrusted::shortened;
 
 use super::document::{BitterliError, Element, ValueError};
 use super::reader::{Parameters, Reader, number};

@@ -2,11 +2,11 @@
 
 use glam::{DMat3, DMat4, DVec3, Vec2};
 use mateval_dataset::TriangleMesh;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::StatedParameters;
 use mateval_dataset::obj::{self, Materials, ObjFault, ObjLimits};
 use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
-use mateval_dataset::source_folder::FileFault;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::shortened;
 
 use super::document::Element;
 use super::reader::{Parameters, Reader};

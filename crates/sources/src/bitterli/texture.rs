@@ -1,9 +1,9 @@
 //! Colour and number parameters: constants, or bitmaps read from files.
 
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_dataset::reference::SourceTexture;
-use mateval_dataset::source_folder::FileFault;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
 use mateval_image::{Texels, Texture, Wrap};
 

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::Severity;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::MaterialClass;
 use mateval_dataset::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
 use mateval_dataset::reference::{MaterialIndex, SourceTexture};
-use mateval_dataset::source_folder::FileFault;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texels, Texture, Wrap};

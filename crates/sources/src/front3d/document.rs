@@ -1,7 +1,7 @@
 //! Parses JSON within limits on memory, and looks up values in it. Lookups treat a value of the wrong type as missing,
 //! since the data has both.
 
-use mateval_image::limits::{hint, without_mark};
+use mateval_files::untrusted::{hint, without_mark};
 use serde_json::Value;
 
 use crate::source_scene::JsonSize;

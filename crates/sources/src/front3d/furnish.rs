@@ -7,11 +7,12 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::{ReferenceScene, Surface};
-use mateval_dataset::source_folder::{LookedFor, SourceFolder};
 use mateval_dataset::{Finding, Role, Severity, TriangleMesh};
+use mateval_files::FileError;
+use mateval_files::source_folder::{LookedFor, SourceFolder};
+use mateval_files::untrusted::shortened;
 
 use super::appearance::{Appearances, MISSING};
 use super::document::Limits;
@@ -176,7 +177,7 @@ fn mirrored(camera: DesignerCamera, compat: bool) -> DesignerCamera {
 
 fn library(files: &HouseFiles, path: &Path, limits: &Limits) -> Result<Library, SourceError> {
     let at = files.root.join(path);
-    let folder = SourceFolder::new(&at, limits.file_bytes).map_err(|source| SourceError::Io { path: at, source })?;
+    let folder = SourceFolder::new(&at, limits.file_bytes).map_err(FileError::io("read", &at))?;
     Ok(Library { folder, name: shown_path(path) })
 }
 

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::UvTransform;
 use mateval_dataset::{Severity, TriangleMesh};
+use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
 use super::document::{HouseError, Limits, kind, list, number, numbers, parse, text};

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_dataset::TriangleMesh;
-use mateval_dataset::findings::shortened;
+use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
 use super::document::{kind, list, number};

@@ -14,9 +14,9 @@ use std::collections::BTreeMap;
 
 use glam::Vec2;
 use mateval_dataset::TriangleMesh;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::material::MaterialClass;
 use mateval_dataset::material::UvTransform;
+use mateval_files::untrusted::sha256_of_bytes;
 
 /// How the roughness and metallic of a house are chosen, since the data states neither.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use mateval_dataset::dataset::SUPER_CATEGORIES;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::MaterialClass;
 use mateval_dataset::obj::{self, Materials, ObjFault, ObjLimits, ObjMesh};
-use mateval_dataset::source_folder::{LookedFor, SourceFolder};
 use mateval_dataset::{Severity, TriangleMesh};
+use mateval_files::source_folder::{LookedFor, SourceFolder};
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::read_texture_and_alpha;
 use mateval_image::{Texture, Wrap};
 use serde_json::Value;

@@ -3,11 +3,10 @@
 //! pointers (RFC 6901).
 
 use gltf::json::validation;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::gltf_file::{self, GltfFile, INSTANCING, json_of};
-use mateval_dataset::source_folder::{FileFault, SourceFolder};
-use mateval_image::limits::without_mark;
+use mateval_files::source_folder::{FileFault, SourceFolder};
+use mateval_files::untrusted::{shortened, without_mark};
 use serde::Deserialize;
 use serde_json::Value;
 

@@ -3,13 +3,13 @@
 //! alpha modes, emission.
 
 use gltf::material::{AlphaMode, PbrSpecularGlossiness};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::material::{
     ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, StatedParameters,
     TextureIndex,
 };
 use mateval_dataset::reference::{EmissionMap, MaterialIndex, SourceTexture};
 use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::Encoding;
 use mateval_image::{Texels, Texture};
 

@@ -9,11 +9,11 @@ use gltf::mesh::Mode;
 use gltf::scene::Transform;
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::camera::{Camera, Intrinsics};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::gltf_file::INSTANCING;
 use mateval_dataset::gltf_file::{indices, numbers};
 use mateval_dataset::reference::{Emission, Surface, SurfaceIndex};
+use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
 use super::reader::{LEFT_OUT, Omission, ReadMaterial, Reader};

@@ -3,11 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::GltfFile;
 use mateval_dataset::material::{StatedParameters, TextureIndex};
 use mateval_dataset::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene};
-use mateval_dataset::source_folder::SourceFolder;
+use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 
 use super::document::Limits;
 use crate::source_scene::{InstanceOrigin, Log, UniqueNames};

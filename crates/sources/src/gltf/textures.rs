@@ -4,13 +4,11 @@
 use std::path::Path;
 
 use mateval_dataset::Severity;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::view_bytes;
-use mateval_dataset::manifest::sha256_of_bytes;
 use mateval_dataset::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_dataset::reference::SourceTexture;
-use mateval_dataset::source_folder::FileFault;
-use mateval_image::limits::hint;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::{hint, sha256_of_bytes, shortened};
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use mateval_image::{ImageError, Texels, Texture, Wrap};
 

@@ -13,7 +13,8 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::submission::SUBMISSION;
-use mateval_image::limits::hint;
+use mateval_files::FileError;
+use mateval_files::untrusted::hint;
 
 use crate::error::SubmissionError;
 pub use tar_gz::unpack_tar_gz;
@@ -37,7 +38,7 @@ impl Opened {
 /// Opens a submission: a folder as it is, an archive after unpacking it to a new folder in `work`. An archive may hold
 /// the submission itself, or one folder that holds it.
 pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
-    let data = std::fs::metadata(path).map_err(SubmissionError::io("read", path))?;
+    let data = std::fs::metadata(path).map_err(FileError::io("read", path))?;
     if data.is_dir() {
         return Ok(Opened { root: path.to_owned(), _unpacked: None });
     }
@@ -45,8 +46,8 @@ pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
     let folder = tempfile::Builder::new()
         .prefix("mateval-unpacked-")
         .tempdir_in(work)
-        .map_err(SubmissionError::io("make a folder in", work))?;
-    let file = std::fs::File::open(path).map_err(SubmissionError::io("read", path))?;
+        .map_err(FileError::io("make a folder in", work))?;
+    let file = std::fs::File::open(path).map_err(FileError::io("read", path))?;
     unpack(file, folder.path()).map_err(|fault| refused(fault, path, folder.path()))?;
     Ok(Opened { root: root_of(folder.path()), _unpacked: Some(folder) })
 }
@@ -63,8 +64,8 @@ fn kind_of(path: &Path, data: &std::fs::Metadata) -> Result<Unpack, SubmissionEr
     let mut start = Vec::new();
     // Something that may be endless, such as a pipe, is not opened.
     if data.is_file() {
-        let file = std::fs::File::open(path).map_err(SubmissionError::io("read", path))?;
-        file.take(START_BYTES).read_to_end(&mut start).map_err(SubmissionError::io("read", path))?;
+        let file = std::fs::File::open(path).map_err(FileError::io("read", path))?;
+        file.take(START_BYTES).read_to_end(&mut start).map_err(FileError::io("read", path))?;
     }
     match start.as_slice() {
         [b'P', b'K', 3, 4, ..] | [b'P', b'K', 5, 6, ..] => Ok(unpack_zip),
@@ -96,6 +97,6 @@ fn root_of(folder: &Path) -> PathBuf {
 fn refused(fault: Fault, archive: &Path, folder: &Path) -> SubmissionError {
     match fault {
         Fault::Refused(findings) => SubmissionError::Archive { path: archive.to_owned(), findings },
-        Fault::Io(source) => SubmissionError::io("unpack to", folder)(source),
+        Fault::Io(source) => FileError::io("unpack to", folder)(source).into(),
     }
 }

@@ -10,7 +10,7 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use flate2::bufread::MultiGzDecoder;
-use mateval_dataset::findings::shortened;
+use mateval_files::untrusted::shortened;
 use tar::{Archive, Entry, EntryType};
 
 use super::unpacked::{Budget, EntryKind, Fault, Writer};

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write as _};
 use std::path::Path;
 
 use mateval_dataset::Finding;
-use mateval_dataset::findings::shortened;
+use mateval_files::untrusted::shortened;
 
 use crate::error::error;
 use crate::map_file::MAX_MAP_BYTES;

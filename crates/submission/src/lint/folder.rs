@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::{Instance, SceneFile};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::{Map, SUBMISSION};
 use mateval_dataset::{Finding, SceneId};
+use mateval_files::FileError;
+use mateval_files::untrusted::shortened;
 
 use crate::archive::MAX_ENTRIES;
 use crate::error::{SubmissionError, error, note, warning};
@@ -50,13 +51,13 @@ pub(super) struct Tree {
 impl Tree {
     /// Lists the folder. Names that are not UTF-8 and entries beyond the limit are findings.
     pub(super) fn walk(root: &Path) -> Result<(Self, Vec<Finding>), SubmissionError> {
-        let real = root.canonicalize().map_err(SubmissionError::io("open", root))?;
+        let real = root.canonicalize().map_err(FileError::io("open", root))?;
         let (mut tree, mut findings) = (Self { entries: BTreeMap::new() }, Vec::new());
         let mut folders = vec![(String::new(), 1)];
         while let Some((folder, depth)) = folders.pop() {
             let path = real.join(&folder);
-            for entry in std::fs::read_dir(&path).map_err(SubmissionError::io("list", &path))? {
-                let entry = entry.map_err(SubmissionError::io("list", &path))?;
+            for entry in std::fs::read_dir(&path).map_err(FileError::io("list", &path))? {
+                let entry = entry.map_err(FileError::io("list", &path))?;
                 if tree.entries.len() == MAX_ENTRIES {
                     let message = format!("more than {MAX_ENTRIES} files and folders; the rest was not checked");
                     findings.push(error("too_many_files", &folder, message, "keep submission.json and the maps only"));

@@ -1,8 +1,8 @@
 //! Headers of maps that can be read but look wrong: fields that are ignored, and fields that no such map should have.
 
 use mateval_dataset::Finding;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::submission::Map;
+use mateval_files::untrusted::shortened;
 use mateval_image::exr_io::{ExrChannel, ExrHeader, ExrNumber};
 use mateval_image::png_io::{PngColor, PngHeader};
 use mateval_image::{Texels, Texture};

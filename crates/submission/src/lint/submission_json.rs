@@ -3,10 +3,9 @@
 
 use std::path::Path;
 
-use mateval_dataset::findings::shortened;
 use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
 use mateval_dataset::{Finding, Severity};
-use mateval_image::limits::{hint, without_mark};
+use mateval_files::untrusted::{hint, shortened, without_mark};
 use serde_json::{Map, Value};
 
 use super::folder::nearest;

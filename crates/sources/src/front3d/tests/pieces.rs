@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DMat4, DQuat};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel, UvTransform};
-use mateval_dataset::source_folder::SourceFolder;
+use mateval_files::source_folder::SourceFolder;
 
 use super::*;
 use crate::source_scene::Log;

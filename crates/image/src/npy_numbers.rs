@@ -2,12 +2,15 @@
 //!
 //! The header is checked before the library sees it, and the data must have exactly the length that follows from it.
 
-use mateval_image::npy_io;
-use mateval_image::npy_io::NpyHeaderError;
-pub use mateval_image::npy_io::{MAX_HEADER_BYTES, MAX_PREFIX_BYTES};
+use crate::npy_io::{self, MAX_HEADER_BYTES, MAX_PREFIX_BYTES, NpyHeaderError, joined};
 
 /// The widest integer, in bytes.
-pub const MAX_NUMBER_BYTES: usize = 8;
+const MAX_NUMBER_BYTES: usize = 8;
+
+/// The size of the largest file of `count` numbers, in bytes.
+pub fn max_bytes(count: usize) -> u64 {
+    (MAX_PREFIX_BYTES + MAX_HEADER_BYTES + MAX_NUMBER_BYTES * count) as u64
+}
 
 /// Why bytes are not an array of integers along one axis.
 #[derive(Debug, thiserror::Error)]
@@ -23,10 +26,6 @@ pub enum NpyError {
     NotIntegers { found: String },
     #[error("expected {expected} bytes of numbers, found {found}")]
     Length { expected: u64, found: u64 },
-}
-
-fn joined(shape: &[u64]) -> String {
-    shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// The numbers of an array with at most one axis whose length is not 1: (N,), (N, 1) or (1, N). Numbers of 2^63 or more

@@ -1,24 +1,17 @@
-//! Folders on disk: whether an output may be written, folders that appear whole or not at all, and the bound on the
-//! size of a cache, a folder whose entries are files, or folders of files.
-//!
-//! Whoever reads an entry of a cache marks it as used now. Whoever adds one removes those that were not used for
-//! longest until the rest is small enough, but none that was used within the last hour, which another process may be
-//! reading.
+//! Folders that appear whole or not at all, and whether an output may be written.
 
-use std::io;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
 
-use mateval_image::store;
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
-use crate::SceneError;
+use crate::error::FileError;
+use crate::whole;
 
 /// Fails where the output `path` exists and `force` does not allow replacing it. `place` is the argument of the command
 /// that names the output, as in `--out`.
-pub fn check_free(path: &Path, force: bool, place: &'static str) -> Result<(), SceneError> {
-    if force || !path.exists() { Ok(()) } else { Err(SceneError::Exists { path: path.to_owned(), place }) }
+pub fn check_free(path: &Path, force: bool, place: &'static str) -> Result<(), FileError> {
+    if force || !path.exists() { Ok(()) } else { Err(FileError::Exists { path: path.to_owned(), place }) }
 }
 
 /// Whether `out`, which need not exist, would lie in `folder`, also by way of links.
@@ -31,12 +24,12 @@ pub fn is_inside(out: &Path, folder: &Path) -> bool {
 }
 
 /// Fails where one of the inputs lies in `out`, or is it: replacing `out` would delete it.
-pub fn check_holds_none(out: &Path, inputs: &[&Path]) -> Result<(), SceneError> {
+pub fn check_holds_none(out: &Path, inputs: &[&Path]) -> Result<(), FileError> {
     let Ok(place) = out.canonicalize() else { return Ok(()) };
     let is_held = |input: &&&Path| input.canonicalize().is_ok_and(|input| input.starts_with(&place));
     match inputs.iter().find(is_held) {
         None => Ok(()),
-        Some(input) => Err(SceneError::HoldsInput { path: out.to_owned(), input: input.to_path_buf() }),
+        Some(input) => Err(FileError::HoldsInput { path: out.to_owned(), input: input.to_path_buf() }),
     }
 }
 
@@ -51,10 +44,10 @@ pub struct WorkFolder {
 impl WorkFolder {
     /// Starts an empty folder, after removing what killed runs left. Fails for a place without a name, as in `.` or
     /// `/`.
-    pub fn start(place: &Path) -> Result<Self, SceneError> {
+    pub fn start(place: &Path) -> Result<Self, FileError> {
         remove_abandoned(place)?;
         let work = beside(place)?;
-        std::fs::create_dir_all(&work).map_err(SceneError::io("make", &work))?;
+        std::fs::create_dir_all(&work).map_err(FileError::io("make", &work))?;
         Ok(Self { place: place.to_owned(), work, replaces: place.exists() })
     }
 
@@ -65,8 +58,8 @@ impl WorkFolder {
 
     /// Moves the folder to its place, in exchange for the folder that was there at the start, which is removed. Fails
     /// where another process has made a folder there meanwhile.
-    pub fn finish(self) -> Result<(), SceneError> {
-        let failed = |error: Errno| SceneError::io("rename to", &self.place)(error.into());
+    pub fn finish(self) -> Result<(), FileError> {
+        let failed = |error: Errno| FileError::io("rename to", &self.place)(error.into());
         // A rename replaces an empty folder and never a full one.
         match (std::fs::rename(&self.work, &self.place), self.replaces) {
             (Ok(()), _) => Ok(()),
@@ -79,14 +72,14 @@ impl WorkFolder {
                     if let Err(source) = std::fs::rename(&self.work, &self.place) {
                         // Otherwise the next start would remove it as abandoned.
                         let _ = old.map(|old| std::fs::rename(old, &self.place));
-                        return Err(SceneError::io("rename to", &self.place)(source));
+                        return Err(FileError::io("rename to", &self.place)(source));
                     }
                     old.map_or(Ok(()), |old| remove(&old))
                 }
                 Err(error) => Err(failed(error)),
             },
-            (Err(_), false) if self.place.exists() => Err(SceneError::MadeMeanwhile { path: self.place.clone() }),
-            (Err(source), false) => Err(SceneError::io("rename to", &self.place)(source)),
+            (Err(_), false) if self.place.exists() => Err(FileError::MadeMeanwhile { path: self.place.clone() }),
+            (Err(source), false) => Err(FileError::io("rename to", &self.place)(source)),
         }
     }
 }
@@ -100,112 +93,42 @@ impl Drop for WorkFolder {
 
 /// Renames a folder, if it exists, to an unused name beside it, which frees its place at once. Returns that name, for
 /// [`remove`].
-pub fn put_aside(place: &Path) -> Result<Option<PathBuf>, SceneError> {
+pub fn put_aside(place: &Path) -> Result<Option<PathBuf>, FileError> {
     let old = beside(place)?;
     match std::fs::rename(place, &old) {
         Ok(()) => Ok(Some(old)),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(SceneError::io("put aside", place)(error)),
+        Err(error) => Err(FileError::io("put aside", place)(error)),
     }
 }
 
 /// Removes what killed runs left beside the folder: unfinished ones, and those that were put aside.
-pub fn remove_abandoned(place: &Path) -> Result<(), SceneError> {
-    store::abandoned_beside(place).iter().try_for_each(|path| remove(path))
+pub fn remove_abandoned(place: &Path) -> Result<(), FileError> {
+    whole::abandoned_beside(place).iter().try_for_each(|path| remove(path))
 }
 
 /// Removes all unfinished folders beside the place, for a caller who alone may write there.
-pub fn remove_beside(place: &Path) -> Result<(), SceneError> {
-    store::all_beside(place).iter().try_for_each(|path| remove(path))
+pub fn remove_beside(place: &Path) -> Result<(), FileError> {
+    whole::all_beside(place).iter().try_for_each(|path| remove(path))
 }
 
 /// Removes a folder or file with all that is in it; does nothing where there is none.
-pub fn remove(path: &Path) -> Result<(), SceneError> {
+pub fn remove(path: &Path) -> Result<(), FileError> {
     let is_folder = std::fs::symlink_metadata(path).is_ok_and(|found| found.is_dir());
     match if is_folder { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) } {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(SceneError::io("remove", path)(error)),
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(FileError::io("remove", path)(error)),
         _ => Ok(()),
     }
 }
 
-fn beside(place: &Path) -> Result<PathBuf, SceneError> {
-    store::beside(place).ok_or_else(|| SceneError::Unsupported {
-        path: place.to_owned(),
-        what: "a folder without a name; name the folder to be made".to_owned(),
-    })
-}
-
-/// Entries that were used within this time stay.
-const SPARED: Duration = Duration::from_secs(3600);
-
-/// Marks an entry as used now by one of its files, or the entry itself if it is a file. Without the permission to do so
-/// it counts as older than it is.
-pub fn mark_used(file: &Path) {
-    // Reading the entry matters more than keeping it.
-    let _ = std::fs::File::options().append(true).open(file).and_then(|file| file.set_modified(SystemTime::now()));
-}
-
-/// Removes what was not used for longest until the entries of `cache` take at most `most_bytes`. An entry was last used
-/// when the newest of its files was.
-pub fn keep_below(cache: &Path, most_bytes: u64) -> io::Result<()> {
-    let mut entries = Vec::new();
-    for entry in std::fs::read_dir(cache)? {
-        let path = entry?.path();
-        // Another process may have removed it in the meantime.
-        entries.extend(Entry::of(path).ok());
-    }
-    entries.sort_by_key(|entry| entry.used);
-    let mut bytes: u64 = entries.iter().map(|entry| entry.bytes).sum();
-    for entry in entries {
-        let is_idle = entry.used.elapsed().is_ok_and(|age| age > SPARED);
-        if bytes <= most_bytes || !is_idle {
-            break;
-        }
-        entry.remove()?;
-        bytes -= entry.bytes;
-    }
-    Ok(())
-}
-
-/// A file or folder of a cache.
-struct Entry {
-    path: PathBuf,
-    bytes: u64,
-    used: SystemTime,
-}
-
-impl Entry {
-    fn of(path: PathBuf) -> io::Result<Self> {
-        let own = path.metadata()?;
-        if !own.is_dir() {
-            return Ok(Self { path, bytes: own.len(), used: own.modified()? });
-        }
-        let (mut bytes, mut used) = (0, None);
-        for file in std::fs::read_dir(&path)? {
-            let file = file?.metadata()?;
-            bytes += file.len();
-            used = used.max(Some(file.modified()?));
-        }
-        Ok(Self { path, bytes, used: used.map_or_else(|| own.modified(), Ok)? })
-    }
-
-    fn remove(&self) -> io::Result<()> {
-        // Renamed first: a folder that is removed in part must not be found.
-        let removed = self.path.with_extension("removed");
-        match std::fs::rename(&self.path, &removed) {
-            // Another process has removed it.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            renamed => renamed?,
-        }
-        if removed.is_dir() { std::fs::remove_dir_all(&removed) } else { std::fs::remove_file(&removed) }
-    }
+fn beside(place: &Path) -> Result<PathBuf, FileError> {
+    whole::beside(place).ok_or_else(|| FileError::Nameless { path: place.to_owned() })
 }
 
 #[cfg(test)]
 mod tests {
-    use mateval_image::store::Owner;
-
     use super::*;
+    use crate::whole::Owner;
 
     #[test]
     fn nothing_is_at_the_place_until_it_is_finished() {
@@ -294,43 +217,5 @@ mod tests {
         drop(WorkFolder::start(&root.path().join("out")).unwrap());
         assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);
         assert!(WorkFolder::start(Path::new(".")).is_err());
-    }
-
-    fn set_used(file: &Path, hours_ago: u64) {
-        let file = std::fs::File::options().append(true).open(file).unwrap();
-        file.set_modified(SystemTime::now() - Duration::from_secs(3600 * hours_ago)).unwrap();
-    }
-
-    /// A folder of 100 bytes, and its empty list, which was used `hours_ago`.
-    fn folder(cache: &Path, name: &str, hours_ago: u64) -> [PathBuf; 2] {
-        let folder = cache.join(name);
-        let [picture, list] = ["input_a.exr", "list.json"].map(|name| folder.join(name));
-        std::fs::create_dir(&folder).unwrap();
-        std::fs::write(&picture, [0; 100]).unwrap();
-        std::fs::write(&list, []).unwrap();
-        set_used(&picture, 50);
-        set_used(&list, hours_ago);
-        [folder, list]
-    }
-
-    #[test]
-    fn what_was_not_used_for_longest_goes_first() {
-        let cache = tempfile::tempdir().unwrap();
-        let [old, older, new] = [("a", 5), ("b", 9), ("c", 0)].map(|(name, hours)| folder(cache.path(), name, hours));
-        let file = cache.path().join("d");
-        std::fs::write(&file, [0; 100]).unwrap();
-        set_used(&file, 7);
-        let left = || [&old[0], &older[0], &new[0], &file].map(|entry| entry.exists());
-        keep_below(cache.path(), 400).unwrap();
-        assert_eq!(left(), [true, true, true, true]);
-        keep_below(cache.path(), 399).unwrap();
-        assert_eq!(left(), [true, false, true, true]);
-        mark_used(&old[1]);
-        keep_below(cache.path(), 0).unwrap();
-        assert_eq!(left(), [true, false, true, false], "what is in use stays");
-        set_used(&old[1], 2);
-        keep_below(cache.path(), 0).unwrap();
-        assert_eq!(left(), [false, false, true, false]);
-        assert_eq!(std::fs::read_dir(cache.path()).unwrap().count(), 1);
     }
 }

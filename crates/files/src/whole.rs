@@ -10,12 +10,12 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
-use crate::ImageError;
+use crate::error::FileError;
 
 /// Writes `bytes` to `path`, replacing an existing file. `path` never holds a half-written file, and of several
 /// processes that write it at once the last one's bytes stay, whole.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    let refused = |source| ImageError::Io { action: "write", path: path.to_owned(), source };
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let refused = FileError::io("write", path);
     let Some(partial) = beside(path) else {
         return Err(refused(std::io::ErrorKind::InvalidFilename.into()));
     };

@@ -10,9 +10,9 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use mateval_image::store::{self, Owner};
-
-use crate::{SceneError, work_folder};
+use crate::error::FileError;
+use crate::whole::{self, Owner};
+use crate::work_folder;
 
 /// How often a holder gives a sign of life.
 const BEAT: Duration = Duration::from_secs(30);
@@ -34,8 +34,8 @@ pub struct Lease {
 impl Lease {
     /// Takes the lease that the file `path` stands for. `what` is what it allows to change, as in "scene 'room'". Fails
     /// where another process holds it, or this one does already.
-    pub fn take(path: &Path, what: &str) -> Result<Self, SceneError> {
-        store::abandoned_beside(path).iter().try_for_each(|left| work_folder::remove(left))?;
+    pub fn take(path: &Path, what: &str) -> Result<Self, FileError> {
+        whole::abandoned_beside(path).iter().try_for_each(|left| work_folder::remove(left))?;
         let claim = Claim::new(path)?;
         while !claim.put_at(path)? {
             claim.break_lost(path, what)?;
@@ -53,16 +53,16 @@ impl Lease {
             }
         };
         let heart = std::thread::Builder::new().name("lease".to_owned()).spawn(beat);
-        lease.heart = Some((sender, heart.map_err(SceneError::io("start a thread for", path))?));
+        lease.heart = Some((sender, heart.map_err(FileError::io("start a thread for", path))?));
         Ok(lease)
     }
 
     /// Like [`Lease::take`], but waits for a holder that lets go of it soon.
-    pub fn wait(path: &Path, what: &str) -> Result<Self, SceneError> {
+    pub fn wait(path: &Path, what: &str) -> Result<Self, FileError> {
         let start = std::time::Instant::now();
         loop {
             match Self::take(path, what) {
-                Err(SceneError::InUse { .. }) if start.elapsed() < PATIENCE => {
+                Err(FileError::InUse { .. }) if start.elapsed() < PATIENCE => {
                     std::thread::sleep(Duration::from_millis(20));
                 }
                 taken => return taken,
@@ -91,7 +91,7 @@ fn write_over(path: &Path, text: &str) -> std::io::Result<()> {
 }
 
 /// Fails where a process holds the lease.
-pub fn check_free(path: &Path, what: &str) -> Result<(), SceneError> {
+pub fn check_free(path: &Path, what: &str) -> Result<(), FileError> {
     // The claim comes first: it makes a network client look at the folder anew.
     Claim::new(path)?.check_lost(path, what)
 }
@@ -103,31 +103,31 @@ struct Claim {
 }
 
 impl Claim {
-    fn new(path: &Path) -> Result<Self, SceneError> {
+    fn new(path: &Path) -> Result<Self, FileError> {
         let folder = path.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
-        let file = store::beside(path).expect("a lease's file has a name");
+        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+        let file = whole::beside(path).expect("a lease's file has a name");
         // Two leases of one process differ too.
         let text = format!("{}\n{}\n", Owner::this_process(), file.display());
         // Made first, so that it removes its file where the disk is full.
         let claim = Self { file, text };
-        std::fs::write(&claim.file, &claim.text).map_err(SceneError::io("write", path))?;
+        std::fs::write(&claim.file, &claim.text).map_err(FileError::io("write", path))?;
         Ok(claim)
     }
 
     /// Links the claim to `path`; false where a file exists.
-    fn put_at(&self, path: &Path) -> Result<bool, SceneError> {
+    fn put_at(&self, path: &Path) -> Result<bool, FileError> {
         match std::fs::hard_link(&self.file, path) {
             Ok(()) => Ok(true),
             // An answer of a network server may be lost although it made the link.
             Err(_) if std::fs::read_to_string(path).is_ok_and(|found| found == self.text) => Ok(true),
             Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(false),
-            Err(error) => Err(SceneError::io("make a hard link at", path)(error)),
+            Err(error) => Err(FileError::io("make a hard link at", path)(error)),
         }
     }
 
     /// Removes the lease at `path` if its holder is lost; fails where it is not.
-    fn break_lost(&self, path: &Path, what: &str) -> Result<(), SceneError> {
+    fn break_lost(&self, path: &Path, what: &str) -> Result<(), FileError> {
         self.check_lost(path, what)?;
         // Of several processes that find it lost, one removes it: another might remove the lease that follows.
         let guard = path.with_extension("break");
@@ -144,10 +144,10 @@ impl Claim {
     }
 
     /// Fails unless the holder of the lease at `path` is lost.
-    fn check_lost(&self, path: &Path, what: &str) -> Result<(), SceneError> {
+    fn check_lost(&self, path: &Path, what: &str) -> Result<(), FileError> {
         let text = match std::fs::read_to_string(path) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-            found => found.map_err(SceneError::io("read", path))?,
+            found => found.map_err(FileError::io("read", path))?,
         };
         // The claim was written a moment ago, so its time is the file system's present, whatever the hosts' clocks say.
         let time = |path: &Path| std::fs::metadata(path).and_then(|found| found.modified()).ok();
@@ -162,7 +162,7 @@ impl Claim {
         if holder.is_gone().unwrap_or(silence > LOST_AFTER) {
             return Ok(());
         }
-        Err(SceneError::InUse { what: what.to_owned(), holder: Box::new(holder), silence, path: path.to_owned() })
+        Err(FileError::InUse { what: what.to_owned(), holder: Box::new(holder), silence, path: path.to_owned() })
     }
 }
 

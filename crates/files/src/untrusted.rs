@@ -1,0 +1,223 @@
+//! Input of unknown origin: files are read within limits, hashed, and named where they are something else than was
+//! expected; texts are made fit for a message.
+
+use std::borrow::Cow;
+use std::io::{Error, ErrorKind, Read as _};
+use std::path::Path;
+
+use sha2::{Digest as _, Sha256};
+
+use crate::error::FileError;
+
+/// The bytes of an ordinary file; fails where there are more than `most`. Anything else, such as `/dev/zero` or a pipe,
+/// is not opened, since its length is unknown and may be endless.
+pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+    let data = std::fs::metadata(path)?;
+    if data.is_dir() {
+        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder, expected a file"));
+    }
+    if !data.is_file() {
+        return Err(Error::new(ErrorKind::InvalidInput, "it is not an ordinary file"));
+    }
+    let mut bytes = Vec::new();
+    // The file may grow while it is read.
+    if data.len() <= most {
+        std::fs::File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    if data.len().max(bytes.len() as u64) > most {
+        return Err(Error::new(ErrorKind::FileTooLarge, format!("it has more than {most} bytes")));
+    }
+    Ok(bytes)
+}
+
+/// The byte order mark that some editors put before UTF-8.
+const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Kinds of files that are found in place of others, by their first bytes. The first that matches counts.
+const KINDS: [(&[u8], &str); 25] = [
+    (b"version https://git-lfs.", "a Git LFS pointer in place of the file; run `git lfs pull` where it was cloned"),
+    (b"\xff\xfe\0\0", "UTF-32 text; save it as UTF-8"),
+    (b"\0\0\xfe\xff", "UTF-32 text; save it as UTF-8"),
+    (b"\xff\xfe", "UTF-16 text; save it as UTF-8"),
+    (b"\xfe\xff", "UTF-16 text; save it as UTF-8"),
+    (b"PK\x03\x04", "a ZIP archive; unpack it"),
+    (b"\x1f\x8b", "gzip data; unpack it"),
+    (b"BZh", "bzip2 data; unpack it"),
+    (b"\xfd7zXZ\0", "XZ data; unpack it"),
+    (b"(\xb5/\xfd", "Zstandard data; unpack it (a .blend is compressed in this way too)"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive; unpack it"),
+    (b"Rar!", "a RAR archive; unpack it"),
+    (b"BLENDER", "a Blender file"),
+    (b"Kaydara FBX Binary", "an FBX file"),
+    (b"PXR-USDC", "a USD file, which MatEval does not read"),
+    (b"#usda", "a USD file, which MatEval does not read"),
+    (b"glTF", "a binary glTF"),
+    (b"ply", "a PLY file"),
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"\x76\x2f\x31\x01", "an OpenEXR picture"),
+    (b"\xabKTX 20\xbb", "a KTX2 texture; convert it with `gltf-transform ktxdecompress`"),
+    (b"DDS ", "a DDS texture; convert it to PNG"),
+    (b"\x93NUMPY", "a NumPy array"),
+    (b"%PDF", "a PDF"),
+];
+
+/// Kinds that begin with a length, by what follows it (ISO/IEC 14496-12).
+const KINDS_BEHIND_LENGTH: [(&[u8], &str); 7] = [
+    (b"ftypavif", "an AVIF picture; save it as PNG or JPEG"),
+    (b"ftypavis", "an AVIF picture; save it as PNG or JPEG"),
+    (b"ftypheic", HEIC),
+    (b"ftypheix", HEIC),
+    (b"ftypheim", HEIC),
+    (b"ftypmif1", HEIC),
+    (b"ftypmsf1", HEIC),
+];
+const HEIC: &str = "a HEIC picture, as telephones write it; save it as PNG or JPEG";
+
+/// How a web page begins, in lower case.
+const WEB_PAGE: [&[u8]; 2] = [b"<!doctype html", b"<html"];
+
+/// The kind of a file that cannot be read as what was expected, and what to do; `None` where its first bytes are those
+/// of no kind that is often mistaken for another.
+pub fn mistaken_for(bytes: &[u8]) -> Option<&'static str> {
+    if bytes.is_empty() {
+        return Some("an empty file");
+    }
+    let among = |kinds: &[(&[u8], &'static str)], bytes: &[u8]| {
+        kinds.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind)
+    };
+    let known = among(&KINDS, bytes).or_else(|| among(&KINDS_BEHIND_LENGTH, bytes.get(4..)?));
+    let known = known.or_else(|| {
+        is_web_page(bytes).then_some("a web page in place of the file; a download probably asked to sign in")
+    });
+    // ASCII characters as UTF-16 without a mark: every second byte is 0.
+    let is_utf16 = || bytes.len() >= 4 && (bytes[..2].contains(&0) && bytes[2..4].contains(&0) && bytes[..4] != [0; 4]);
+    known.or_else(|| is_utf16().then_some("UTF-16 text; save it as UTF-8"))
+}
+
+fn is_web_page(bytes: &[u8]) -> bool {
+    let bytes = without_mark(bytes).trim_ascii_start();
+    WEB_PAGE.iter().any(|start| bytes.get(..start.len()).is_some_and(|found| found.eq_ignore_ascii_case(start)))
+}
+
+/// Whether the file is a Git LFS pointer, which no format of ours begins like.
+pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
+    bytes.starts_with(KINDS[0].0)
+}
+
+/// The bytes without a UTF-8 byte order mark.
+pub fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes)
+}
+
+/// A sentence's end that names the kind: `; it is a ZIP archive; unpack it`, or nothing.
+pub fn hint(bytes: &[u8]) -> Cow<'static, str> {
+    mistaken_for(bytes).map_or(Cow::Borrowed(""), |kind| Cow::Owned(format!("; it is {kind}")))
+}
+
+/// SHA-256 of bytes, hex.
+pub fn sha256_of_bytes(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of a file's bytes, hex.
+pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
+    let mut file = std::fs::File::open(path).map_err(FileError::io("read", path))?;
+    let mut hash = Sha256::new();
+    let mut block = vec![0; 1 << 16];
+    loop {
+        let length = file.read(&mut block).map_err(FileError::io("read", path))?;
+        if length == 0 {
+            return Ok(hex(&hash.finalize()));
+        }
+        hash.update(&block[..length]);
+    }
+}
+
+/// Bytes in hexadecimal digits, as hashes are written.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The first 80 characters of untrusted text, with control characters escaped.
+pub fn shortened(text: &str) -> String {
+    let short: String = text.chars().take(80).collect::<String>().escape_debug().to_string();
+    if text.chars().nth(80).is_some() { format!("{short}...") } else { short }
+}
+
+/// An untrusted text in quotes, without control characters and at most 80 characters long.
+pub fn quoted(text: &str) -> String {
+    format!("'{}'", text.chars().take(80).collect::<String>().escape_debug())
+}
+
+/// An untrusted name, made safe to print: one line of at most `most` characters, without characters that control a
+/// terminal or reverse the direction of the text.
+pub fn shown(name: &str, most: usize) -> String {
+    let is_control = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+            || (c as u32) & 0xfffe == 0xfffe
+    };
+    let whole: Vec<char> = name.chars().take(most + 1).map(|c| if is_control(c) { '\u{fffd}' } else { c }).collect();
+    match whole.len() > most {
+        true => whole[..most - 1].iter().collect::<String>() + "…",
+        false => whole.into_iter().collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_texts_are_cut() {
+        assert_eq!(shortened("a\nb"), "a\\nb");
+        assert_eq!(shortened(&"x".repeat(100)).len(), 83);
+    }
+
+    #[test]
+    fn no_more_is_read_than_is_wanted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, "abc").unwrap();
+        assert_eq!(read_at_most(&path, 3).unwrap(), b"abc");
+        assert_eq!(read_at_most(&path, 2).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        assert_eq!(read_at_most(folder.path(), 3).unwrap_err().kind(), ErrorKind::IsADirectory);
+        assert_eq!(read_at_most(&folder.path().join("none"), 3).unwrap_err().kind(), ErrorKind::NotFound);
+    }
+
+    /// The system reports their length as 0.
+    #[cfg(unix)]
+    #[test]
+    fn what_has_no_end_is_not_begun() {
+        assert!(read_at_most(Path::new("/dev/zero"), 3).unwrap_err().to_string().contains("not an ordinary file"));
+    }
+
+    #[test]
+    fn mistaken_files_are_named() {
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n";
+        assert!(is_lfs_pointer(pointer) && hint(pointer).contains("git lfs pull"));
+        for (bytes, word) in [
+            (b"\xff\xfe{\0}\0".as_slice(), "UTF-16"),
+            (b"{\0\"\0", "UTF-16"),
+            (b"\0{\0\"", "UTF-16"),
+            (b"PK\x03\x04...", "ZIP"),
+            (b"#usda 1.0", "USD"),
+            (b"", "empty"),
+            (b"<!DOCTYPE html>", "web page"),
+            (b"\n<HTML lang='en'>", "web page"),
+            (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "HEIC"),
+            (b"\0\0\0\x18ftypmif1", "HEIC"),
+            (b"\0\0\0\x1cftypavif", "AVIF"),
+        ] {
+            assert!(mistaken_for(bytes).is_some_and(|kind| kind.contains(word)), "{word}");
+        }
+        // Twins: what the readers expect.
+        for bytes in
+            [b"{}".as_slice(), b"<scene version='3'/>", b"v 0 0 0\n", b"\xef\xbb\xbf{}", b"{", b"\0\0\0\0", b"<htm"]
+        {
+            assert_eq!(mistaken_for(bytes), None);
+        }
+        assert_eq!((without_mark(b"\xef\xbb\xbf{}"), without_mark(b"{}")), (b"{}".as_slice(), b"{}".as_slice()));
+    }
+}
