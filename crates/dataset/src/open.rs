@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_file;
 use mateval_files::whole::is_temporary;
 use schemars::JsonSchema;
@@ -145,7 +146,7 @@ pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, SceneError> {
     };
     let reason = match std::fs::metadata(root) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => "the folder does not exist".to_owned(),
-        Err(source) => return Err(SceneError::Io { action: "read", path: root.to_owned(), source }),
+        Err(source) => return Err(FileError::io("read", root)(source).into()),
         Ok(data) if !data.is_dir() => "it is a file; expected a folder with a dataset.json".to_owned(),
         Ok(_) => match below() {
             Some(folder) => format!("it has no dataset.json, but '{}' has one", folder.display()),
