@@ -1,4 +1,4 @@
-//! `prep mitsuba`: a view of the sample for Mitsuba 3.
+//! `prep export --as mitsuba`: a view of the sample for Mitsuba 3.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::sample::{copied_dataset, dataset, files_below, own_materials};
 
 fn export(dataset: &Path, scene: &str, view: &str, out: &Path, more: &[&str]) -> Run {
     let words = ["--scene", scene, "--view", view, "--samples", "4"];
-    run(mateval().args(["prep", "mitsuba"]).arg(dataset).args(words).arg("--out").arg(out).args(more))
+    run(mateval().args(["prep", "export", "--as", "mitsuba"]).arg(dataset).args(words).arg("--out").arg(out).args(more))
 }
 
 /// Converted materials are Blender's, which Mitsuba does not have.
@@ -66,4 +66,13 @@ fn changed_truth_is_refused() {
     std::fs::write(&lights, text.replacen("\"camera_visible\": true", "\"camera_visible\": false", 1)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     export(changed.path(), "room", "input", &folder.path().join("out"), &[]).ends_with(2).says("lights.json");
+}
+
+#[test]
+fn one_scene_is_named() {
+    let export =
+        |words: &[&str]| run(mateval().args(["prep", "export", "nowhere", "--out", "out", "--as"]).args(words));
+    export(&["mitsuba"]).ends_with(2).says("--scene");
+    export(&["tar", "--scene", "room"]).ends_with(2).says("--scene is for --as mitsuba");
+    export(&["tar", "--force"]).ends_with(2).says("--scene");
 }

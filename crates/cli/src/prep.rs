@@ -15,7 +15,7 @@ use mateval_prep::stats;
 use mateval_prep::verify::verify;
 
 use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, samples_parser};
-use self::publish::{ExportArgs, MitsubaArgs, PublishArgs};
+use self::publish::{ExportArgs, PublishArgs};
 use crate::TOOL;
 use crate::arguments::{Format, check_output_file, open_dataset};
 use crate::terminal::{Outcome, print, say, with_progress};
@@ -43,12 +43,10 @@ pub enum Command {
     /// Splits a dataset into the public files and the ground truth of a hidden split, and writes a page that describes
     /// the release. Exit code 1: the page states a fault.
     Publish(PublishArgs),
-    /// Writes a dataset in a format that other tools read: tars, Croissant, Hugging Face, nerfstudio or COLMAP.
+    /// Writes a dataset in a format that other tools read: tars, Croissant, Hugging Face, nerfstudio, COLMAP or Mitsuba.
     Export(ExportArgs),
     /// Counts what a dataset holds: the paper's Table I, objects by category, and numbers scene by scene.
     Stats(StatsArgs),
-    /// Writes a view with its ground truth as a scene for Mitsuba 3. Exit code 1: Mitsuba cannot express all of it.
-    Mitsuba(MitsubaArgs),
 }
 
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
@@ -63,7 +61,6 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Publish(args) => args.run(),
         Command::Export(args) => args.run(),
         Command::Stats(args) => args.run(),
-        Command::Mitsuba(args) => args.run(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The commands that pass a dataset on: `mateval prep publish`, `export` and `mitsuba`.
+//! The commands that pass a dataset on: `mateval prep publish` and `export`.
 
 use std::path::{Path, PathBuf};
 
@@ -184,6 +184,18 @@ pub struct ExportArgs {
     /// For croissant: how to cite the dataset [default: its name, version and hash].
     #[arg(long)]
     citation: Option<String>,
+    /// For mitsuba: the scene to write.
+    #[arg(long, required_if_eq("format", "mitsuba"))]
+    scene: Option<SceneId>,
+    /// For mitsuba: the view to write.
+    #[arg(long, requires = "scene", default_value = "input")]
+    view: ViewId,
+    /// For mitsuba: samples per pixel [default: the recipe's].
+    #[arg(long, requires = "scene", value_parser = samples_parser())]
+    samples: Option<u32>,
+    /// For mitsuba: replace a folder that already exists.
+    #[arg(long, requires = "scene")]
+    force: bool,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -198,26 +210,26 @@ enum FormatName {
     Nerfstudio,
     /// For each scene a folder with COLMAP's text model.
     Colmap,
-}
-
-impl FormatName {
-    fn format(self) -> Format {
-        match self {
-            Self::Tar => Format::Tar,
-            Self::Croissant => Format::Croissant,
-            Self::Huggingface => Format::Huggingface,
-            Self::Nerfstudio => Format::Nerfstudio,
-            Self::Colmap => Format::Colmap,
-        }
-    }
+    /// A view with its ground truth as a scene for Mitsuba 3. Exit code 1: Mitsuba cannot express all of it.
+    Mitsuba,
 }
 
 impl ExportArgs {
     /// Exports the dataset and prints what was written.
     pub fn run(&self) -> anyhow::Result<Outcome> {
+        let format = match (self.format, &self.scene) {
+            (FormatName::Mitsuba, Some(scene)) => return self.run_mitsuba(scene),
+            (FormatName::Mitsuba, None) => bail!("--as mitsuba writes one scene; give --scene SCENE"),
+            (_, Some(_)) => bail!("--scene is for --as mitsuba; the other formats hold the whole dataset"),
+            (FormatName::Tar, None) => Format::Tar,
+            (FormatName::Croissant, None) => Format::Croissant,
+            (FormatName::Huggingface, None) => Format::Huggingface,
+            (FormatName::Nerfstudio, None) => Format::Nerfstudio,
+            (FormatName::Colmap, None) => Format::Colmap,
+        };
         let options = ExportOptions {
             dataset: self.dataset.clone(),
-            format: self.format.format(),
+            format,
             out: self.out.clone(),
             publication: croissant::Publication {
                 url: self.url.clone(),
@@ -240,35 +252,12 @@ impl ExportArgs {
         print(&format!("{line}\n"))?;
         Ok(Outcome::Good)
     }
-}
 
-#[derive(clap::Args)]
-pub struct MitsubaArgs {
-    /// Folder of the dataset.
-    dataset: PathBuf,
-    /// The scene to export.
-    #[arg(long)]
-    scene: SceneId,
-    /// The view to export.
-    #[arg(long, default_value = "input")]
-    view: ViewId,
-    /// Folder that scene.xml, meshes and textures are written to.
-    #[arg(long)]
-    out: PathBuf,
-    /// Samples per pixel [default: the recipe's].
-    #[arg(long, value_parser = samples_parser())]
-    samples: Option<u32>,
-    /// Replace a folder that already exists.
-    #[arg(long)]
-    force: bool,
-}
-
-impl MitsubaArgs {
-    /// Exports the view and reports what Mitsuba cannot express.
-    pub fn run(&self) -> anyhow::Result<Outcome> {
-        let findings = self.export().context("cannot export to Mitsuba")?;
+    /// Exports a view and reports what Mitsuba cannot express.
+    fn run_mitsuba(&self, scene: &SceneId) -> anyhow::Result<Outcome> {
+        let findings = self.export_view(scene).context("cannot export to Mitsuba")?;
         for finding in &findings {
-            say(&format!("{}: {finding}", self.scene));
+            say(&format!("{scene}: {finding}"));
         }
         let differences = findings.iter().filter(|finding| finding.severity != Severity::Note).count();
         let verdict = if differences == 0 { "means the same" } else { "does NOT mean the same" };
@@ -277,13 +266,13 @@ impl MitsubaArgs {
         Ok(if differences == 0 { Outcome::Good } else { Outcome::No })
     }
 
-    fn export(&self) -> anyhow::Result<Vec<Finding>> {
+    fn export_view(&self, scene: &SceneId) -> anyhow::Result<Vec<Finding>> {
         check_free(&self.out, self.force, "folder")?;
         let dataset = Dataset::open(&self.dataset)?;
         let samples = match self.samples {
             Some(samples) => samples,
             None => recipe::read(&self.dataset.join(RECIPE))?.0.samples,
         };
-        Ok(export_view(&dataset, &self.scene, &self.view, samples, &self.out)?)
+        Ok(export_view(&dataset, scene, &self.view, samples, &self.out)?)
     }
 }
