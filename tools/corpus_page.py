@@ -10,7 +10,7 @@ from pathlib import Path
 
 from corpus_run import RESOLUTION, Outcome, Result
 
-STYLE = Path(__file__).resolve().parent.parent / "crates/report/src/leaderboard/templates/site.css"
+STYLE = Path(__file__).resolve().parent.parent / "crates/pages/src/style.css"
 LOG_CHARACTERS = 20_000
 """How much of a log is shown, from its start and from its end."""
 

@@ -234,7 +234,11 @@ fn check_page(out: &Path, file: &CompareFile) {
     assert_eq!(sorted, pictures);
     // Four pictures of each light; of geometry, three of each of five.
     assert_eq!(shown.len(), 5 * (4 * 4 + 5 * 3));
-    assert!(!html.contains("http") && html.contains(&mateval_prep::compare::tables::verdict(file)));
+    assert!(
+        !html.contains("http:")
+            && !html.contains("https:")
+            && html.contains(&mateval_prep::compare::tables::verdict(file))
+    );
 }
 
 /// The sample's own materials: tiles with plastic and glass do not decide; in the others the lamp is too noisy, which

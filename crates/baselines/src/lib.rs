@@ -26,7 +26,6 @@ pub mod import;
 pub mod lift;
 pub mod maps;
 pub mod nn;
-mod page_shell;
 pub mod procedural;
 pub mod submission;
 

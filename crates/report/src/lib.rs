@@ -19,12 +19,3 @@ pub mod strips;
 pub mod tables;
 
 pub use error::ReportError;
-
-/// What every page that we write shares.
-pub mod page_style {
-    /// The style sheet, light and dark.
-    pub const STYLE: &str = include_str!("leaderboard/templates/site.css");
-
-    /// Sorts tables with `data-sortable` when a button in their head is pressed.
-    pub const SORT: &str = include_str!("leaderboard/templates/sort.js");
-}

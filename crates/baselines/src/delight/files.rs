@@ -10,13 +10,13 @@ use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
+use mateval_pages::{figure, plain};
 use serde::{Deserialize, Serialize};
 
 use super::room::FittedLight;
 use super::{CandidateLights, DelightOptions, DelitPhoto, delight};
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
-use crate::page_shell::{figure, page};
 use crate::submission::check_new_place;
 
 pub(super) const LIGHTS_FORMAT: &str = "mateval-fitted-lights/2";
@@ -117,21 +117,21 @@ const PICTURES: [(&str, &str); 7] = [
 pub(super) fn html(scenes: &[Shown]) -> String {
     let introduction = "A photo is base colour times the light on a white surface, plus light that does not depend on \
                         base colour. <code>mateval baseline relight</code> lights the rooms anew.";
-    page("De-lit photos", introduction, &scenes.iter().map(section).collect::<String>())
+    plain("De-lit photos", introduction, &scenes.iter().map(section).collect::<String>(), "")
 }
 
 fn section(Shown { id, lights, rounds }: &Shown) -> String {
-    let mut text = format!("<section><h2>{id}</h2><div class=\"pictures\">\n");
+    let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
     text.extend(PICTURES.map(|(file, caption)| figure(&format!("{id}/{file}.png"), id, caption)));
     let count = lights.len();
     text.push_str("</div><details><summary>");
     write!(text, "{count} lights after {rounds} rounds").expect("writing to a String cannot fail");
     text.push_str(
-        "</summary><div class=\"scroll\"><table><tr><th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr>\n",
+        "</summary><div class=\"wide\"><table><thead><tr><th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr></thead><tbody>\n",
     );
     text.extend(lights.iter().map(|FittedLight { light, radiance: [r, g, b] }| {
-        format!("<tr><td>{}</td><td>{r:.4}</td><td>{g:.4}</td><td>{b:.4}</td></tr>\n", light.name)
+        format!("<tr><th scope=\"row\">{}</th><td>{r:.4}</td><td>{g:.4}</td><td>{b:.4}</td></tr>\n", light.name)
     }));
-    text.push_str("</table></div></details></section>\n");
+    text.push_str("</tbody></table></div></details></section>\n");
     text
 }

@@ -50,5 +50,5 @@
     draw();
   };
 
-  document.querySelectorAll(".room").forEach((room) => start(room));
+  document.querySelectorAll(".relit").forEach((room) => start(room));
 })();

@@ -6,7 +6,6 @@
 //! seen through windows, and pixels without a known surface, such as glass.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
@@ -18,6 +17,7 @@ use mateval_image::exr_io::{Precision, read_linear, read_scalar, write_linear};
 use mateval_image::png_io::jpeg_bytes;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Picture};
+use mateval_pages::{figure, plain};
 use mateval_tracer::{PhotoCache, SplitLight, split_light};
 
 use super::files::{LIGHTS_FORMAT, LightsFile, exposed};
@@ -26,7 +26,6 @@ use super::surfaces::{Surfaces, part_colors, settings};
 use super::{filtered, weighted};
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
-use crate::page_shell::{figure, page};
 use crate::submission::check_new_place;
 
 /// A light that shines more or less than it was fitted.
@@ -373,13 +372,11 @@ impl ScaledPicture {
 /// The page. Ids and names of lights contain no characters that are special in HTML.
 fn html(scenes: &[Shown]) -> String {
     let introduction = "Each slider multiplies the radiance of one light; 1 is as it was fitted.";
-    let mut sections: String = scenes.iter().map(room_section).collect();
-    writeln!(sections, "<script>{MIX}</script>").expect("writing to a String cannot fail");
-    page("Rooms lit anew", introduction, &sections)
+    plain("Rooms lit anew", introduction, &scenes.iter().map(room_section).collect::<String>(), MIX)
 }
 
 fn room_section(Shown { id, size: [width, height], lights, rest }: &Shown) -> String {
-    let mut text = format!("<section class=\"room\"><h2>{id}</h2><div class=\"pictures pair\">\n");
+    let mut text = format!("<section class=\"relit\"><h2>{id}</h2><div class=\"row\">\n");
     text.push_str(&figure(&format!("{id}/photo.png"), id, "The photo"));
     text.extend([
         format!(

@@ -10,6 +10,7 @@ use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
+use mateval_pages::{escaped, figure, plain};
 use mateval_procedural::Graph;
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::library::{Class, LIBRARY};
@@ -21,7 +22,6 @@ use super::part_frame::Chart;
 use super::part_samples::PartSamples;
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Placement};
-use crate::page_shell::{figure, page};
 use crate::submission::Method;
 
 /// The name of the file.
@@ -313,12 +313,12 @@ pub(super) fn html(method: &Method, scenes: &[ShownScene]) -> String {
         escaped(&method.name),
         escaped(&method.description)
     );
-    page("Procedural materials", &introduction, &scenes.iter().map(section).collect::<String>())
+    plain("Procedural materials", &introduction, &scenes.iter().map(section).collect::<String>(), "")
 }
 
 fn section(scene: &ShownScene) -> String {
     let id = &scene.report.id;
-    let mut text = format!("<section><h2>{id}</h2><div class=\"pictures\">\n");
+    let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
     for (name, caption) in pictures(scene.has_photo) {
         text.push_str(&figure(&format!("{id}/{name}.png"), id, caption));
     }
@@ -349,19 +349,19 @@ fn pictures(has_photo: bool) -> Vec<(&'static str, &'static str)> {
 fn with_graph(scene: &ShownScene, part: &PartReport) -> String {
     let (id, name) = (&scene.report.id, &part.part);
     let Some(chosen) = &part.chosen else { return String::new() };
-    let mut text = format!("<h3>{name}: {}</h3><div class=\"pictures\">\n", escaped(&chosen.graph));
+    let mut text = format!("<h3>{name}: {}</h3><div class=\"row\">\n", escaped(&chosen.graph));
     for (picture, caption) in pictures(scene.has_photo).into_iter().chain([("swatch", "The graph from the front")]) {
         text.push_str(&figure(&format!("{id}/{name}-{picture}.png"), name, caption));
     }
     text.push_str("</div><p>");
     text.push_str(&errors(part, chosen));
-    text.push_str("</p><details><summary>Parameters</summary><div class=\"scroll\"><table>\n");
+    text.push_str("</p><details><summary>Parameters</summary><div class=\"wide\"><table><tbody>\n");
     for (parameter, numbers) in &chosen.parameters {
         let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:.4}")).collect();
-        writeln!(text, "<tr><td>{}</td><td>{}</td></tr>", escaped(parameter), numbers.join(", "))
+        writeln!(text, "<tr><th scope=\"row\">{}</th><td>{}</td></tr>", escaped(parameter), numbers.join(", "))
             .expect("writing to a String cannot fail");
     }
-    text.push_str("</table></div></details>\n");
+    text.push_str("</tbody></table></div></details>\n");
     text
 }
 
@@ -381,8 +381,8 @@ fn errors(part: &PartReport, chosen: &GraphReport) -> String {
 /// All parts that are seen, in a table.
 fn table(parts: &[&PartReport]) -> String {
     let mut text = String::from(
-        "<details><summary>All seen parts</summary><div class=\"scroll\"><table><tr><th>Part</th><th>Pixels</th>\
-         <th>Material</th><th>Error</th><th>One colour</th><th>Runner-up</th></tr>\n",
+        "<details><summary>All seen parts</summary><div class=\"wide\"><table><thead><tr><th>Part</th><th>Pixels</th>\
+         <th>Material</th><th>Error</th><th>One colour</th><th>Runner-up</th></tr></thead><tbody>\n",
     );
     let number = |error: Option<f64>| error.map_or("-".to_owned(), |error| format!("{error:.5}"));
     for part in parts.iter().filter(|part| part.pixels > 0) {
@@ -395,7 +395,7 @@ fn table(parts: &[&PartReport]) -> String {
         let (error, flat) = (part.chosen.as_ref().map(|chosen| chosen.error), part.error_of_one_color);
         writeln!(
             text,
-            "<tr><td>{}</td><td>{}</td><td>{material}</td><td>{}</td><td>{}</td><td>{runner_up}</td></tr>",
+            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{material}</td><td>{}</td><td>{}</td><td>{runner_up}</td></tr>",
             part.part,
             part.pixels,
             number(error),
@@ -403,13 +403,8 @@ fn table(parts: &[&PartReport]) -> String {
         )
         .expect("writing to a String cannot fail");
     }
-    text.push_str("</table></div></details>\n");
+    text.push_str("</tbody></table></div></details>\n");
     text
-}
-
-/// Text with the characters replaced that are special in HTML.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -422,10 +417,5 @@ mod tests {
         let named: Vec<String> =
             ["floor-p0", "floor.p0", "floor_p0"].map(|part| distinct(name_of(part), &mut taken)).into();
         assert_eq!(named, ["part_floor_p0", "part_floor_p0_2", "part_floor_p0_3"]);
-    }
-
-    #[test]
-    fn text_is_escaped() {
-        assert_eq!(escaped("<a href=\"b\">&"), "&lt;a href=&quot;b&quot;&gt;&amp;");
     }
 }

@@ -8,11 +8,12 @@ use mateval_files::{FileError, untrusted};
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Normal, Picture};
+use mateval_pages as pages;
+use minijinja::context;
 use minijinja::value::Serde;
-use minijinja::{Environment, context};
 use serde::Serialize;
 
-use super::file::{CompareFile, LightComparison, SourceComparison, State};
+use super::file::{CompareFile, ComparedDataset, LightComparison, SourceComparison, State};
 use super::geometry::{OurGeometry, TheirGeometry, angle_deg, away_from_edges};
 use super::light::ShownKinds;
 use super::tables::{faults, verdict};
@@ -46,16 +47,13 @@ pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String
             }
         })
         .collect();
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| minijinja::AutoEscape::Html);
-    let text = environment.render_str(
-        TEMPLATE,
-        context! {
-            tool => &file.tool, renderer => &file.renderer, dataset => Serde(&file.dataset), agrees => file.agrees,
-            verdict => verdict(file), faults => faults(file), scenes,
-        },
-    );
-    text.expect("the template uses only values that the context holds")
+    let ComparedDataset { name, version, .. } = &file.dataset;
+    let values = context! {
+        title => format!("{name} {version}: {} compared with MatEval", file.renderer),
+        tool => &file.tool, renderer => &file.renderer, dataset => Serde(&file.dataset), agrees => file.agrees,
+        verdict => verdict(file), faults => faults(file), scenes,
+    };
+    pages::single(TEMPLATE, values, "")
 }
 
 /// How far the converted materials of a scene are from the source's own.

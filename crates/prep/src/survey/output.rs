@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::dataset::SourceFile;
 use mateval_dataset::json;
 use mateval_files::whole::write_whole;
+use minijinja::context;
 use minijinja::value::Serde;
-use minijinja::{Environment, context};
 use serde::Serialize;
 
 use super::house::{HouseName, HousePart, SurveyFolder, shown};
@@ -169,14 +169,13 @@ fn quoted(text: &str) -> String {
 }
 
 const TEMPLATE: &str = include_str!("page.j2");
+const PICK: &str = include_str!("pick.js");
 
 /// HTML that shows every candidate with its thumbnail and lists every rejected room with its reasons. A short script on
 /// the page joins the ticked candidates into a recipe at its end.
 fn page(survey: &SurveyFile, texts: &RecipeTexts) -> String {
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| minijinja::AutoEscape::Html);
-    let text = environment.render_str(TEMPLATE, context! { survey => Serde(survey), texts => Serde(texts) });
-    text.expect("the template uses only values that the context holds")
+    let values = context! { title => "Rooms to pick from", survey => Serde(survey), texts => Serde(texts) };
+    mateval_pages::single(TEMPLATE, values, PICK)
 }
 
 #[cfg(test)]

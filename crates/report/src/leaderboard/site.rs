@@ -4,27 +4,26 @@ use std::path::{Path, PathBuf};
 
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
+use mateval_pages as pages;
 use minijinja::value::{Serde, Value};
-use minijinja::{AutoEscape, Environment, context};
+use minijinja::{Environment, context};
 use serde::Serialize;
 
 use crate::error::ReportError;
-use crate::page_style::{SORT, STYLE};
 
 /// Files that are written unchanged.
 const ASSETS: [(&str, &str); 6] = [
-    ("site.css", STYLE),
-    ("sort.js", SORT),
+    ("site.css", pages::STYLE),
+    ("sort.js", pages::SORT),
+    ("slider.js", pages::SLIDER),
     ("board.js", include_str!("templates/board.js")),
     ("scene.js", include_str!("templates/scene.js")),
-    ("slider.js", include_str!("templates/slider.js")),
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 14] = [
+const TEMPLATES: [(&str, &str); 12] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
-    ("slider.j2", include_str!("templates/slider.j2")),
     ("board.j2", include_str!("templates/board.j2")),
     ("method.j2", include_str!("templates/method.j2")),
     ("scenes.j2", include_str!("templates/scenes.j2")),
@@ -33,7 +32,6 @@ const TEMPLATES: [(&str, &str); 14] = [
     ("protocol.j2", include_str!("templates/protocol.j2")),
     ("paper.j2", include_str!("templates/paper.j2")),
     ("errata.j2", include_str!("templates/errata.j2")),
-    ("charts.j2", include_str!("templates/charts.j2")),
     ("wide_views.j2", include_str!("templates/wide_views.j2")),
     ("perturbed.j2", include_str!("templates/perturbed.j2")),
 ];
@@ -94,8 +92,7 @@ pub(super) struct SiteWriter<'a> {
 
 impl<'a> SiteWriter<'a> {
     pub(super) fn new(folder: &'a Path, site: Site) -> Self {
-        let mut environment = Environment::new();
-        environment.set_auto_escape_callback(|_| AutoEscape::Html);
+        let mut environment = pages::environment();
         for (name, text) in TEMPLATES {
             environment.add_template(name, text).expect("the templates are valid: a test fills all of them");
         }
@@ -108,8 +105,8 @@ impl<'a> SiteWriter<'a> {
 
     pub(super) fn page(&self, page: &Page<'_>) -> Result<(), ReportError> {
         let root = if page.file.contains('/') { "../" } else { "" };
-        let (scripts, site) = (Serde(page.scripts), Serde(&self.site));
-        let shared = context! { site, root, title => page.title, current => page.file, scripts };
+        let (shell, site) = (pages::linked(root, page.scripts), Serde(&self.site));
+        let shared = context! { site, root, title => page.title, current => page.file, shell };
         let template = self.environment.get_template(page.template).expect("every page names one of the templates");
         let text = template.render(context! { ..page.values.clone(), ..shared });
         self.file(page.file, &text.expect("the templates are valid: a test fills all of them"))

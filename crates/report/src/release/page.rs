@@ -3,16 +3,15 @@
 //! Its first lines are numbers at a glance, what fails, and what was not given.
 
 use mateval_dataset::{Finding, Severity};
+use mateval_pages as pages;
+use minijinja::context;
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, context};
 use serde::Serialize;
-use sha2::{Digest as _, Sha256};
 
 use super::file::ReleaseFile;
 use super::given::ReferenceScores;
 use super::page_scene::{SHOWN_SCORES, ScenePage, cpu_seconds, duration, plural, worst_psnr};
 use super::table_one::rows;
-use crate::page_style::{SORT, STYLE};
 
 const TEMPLATE: &str = include_str!("page.j2");
 
@@ -47,31 +46,21 @@ pub(crate) fn page(file: &ReleaseFile) -> String {
     let mut sorted: Vec<&ScenePage<'_>> = scenes.iter().collect();
     // The sort is stable: the dataset's order remains within the failures and the others.
     sorted.sort_by_key(|page| !page.fails());
-    let script = format!("{SORT}\n{OPEN}");
+    let script = format!("{}\n{OPEN}", pages::SORT);
     let columns = SHOWN_SCORES.map(|(title, _)| title);
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    let text = environment.render_str(
-        TEMPLATE,
-        context! {
-            style => STYLE, style_hash => csp_hash(STYLE), script => &script, script_hash => csp_hash(&script),
-            file => Serde(file), scenes => Serde(&sorted), headlines => Serde(headlines(file)),
-            failures => Serde(failures), whole => whole_findings(file), not_given => Serde(not_given(file)),
-            table_one => Serde(rows(&file.stats, file.evaluated)), columns, bounds => Serde(bounds(file)),
-            is_good => file.is_good(),
-        },
-    );
-    text.expect("a test fills the template")
+    let values = context! {
+        title => format!("{} {}", file.dataset.name, file.dataset.version),
+        file => Serde(file), scenes => Serde(&sorted), headlines => Serde(headlines(file)),
+        failures => Serde(failures), whole => whole_findings(file), not_given => Serde(not_given(file)),
+        table_one => Serde(rows(&file.stats, file.evaluated)), columns, bounds => Serde(bounds(file)),
+        is_good => file.is_good(),
+    };
+    pages::single(TEMPLATE, values, &script)
 }
 
 fn bounds(file: &ReleaseFile) -> Vec<Bound<'_>> {
     let both = [("ceiling", &file.ceiling), ("floor", &file.floor)];
     both.into_iter().filter_map(|(name, scores)| Some(Bound { name, scores: scores.as_ref()? })).collect()
-}
-
-/// The hash by which the page's policy allows the text of an element.
-fn csp_hash(text: &str) -> String {
-    format!("'sha256-{}'", base64::encode(Sha256::digest(text.as_bytes())))
 }
 
 #[derive(Serialize)]
