@@ -17,7 +17,7 @@ fn case(name: &str, scene: ReferenceScene, camera: Camera, samples: u32) -> Case
 /// A Mitsuba scene, read by our reader, with a picture `width` pixels wide.
 fn source(name: &str, xml: &Path, width: u32, samples: u32) -> Case {
     let read = bitterli::read(xml, None, &Limits::default()).unwrap();
-    let mut camera = read.camera;
+    let mut camera = read.camera.unwrap();
     let scale = f64::from(width) / f64::from(camera.intrinsics.width);
     let k = &mut camera.intrinsics;
     // Whole pixels and equal focal lengths along both axes; the picture may lose part of a row.

@@ -11,7 +11,8 @@ use mateval_dataset::reference::{Emission, ReferenceScene, Surface};
 use mateval_dataset::{Camera, SceneId, SceneLights, reference};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{Picture, Texture, Wrap, png_io};
-use mateval_sources::gltf::{self, GltfScene, Limits};
+use mateval_sources::gltf::{self, Limits};
+use mateval_sources::source_scene::FileScene;
 use mateval_testkit::kept_folder;
 use mateval_tracer::{RenderSettings, World};
 use serde_json::{Value, json};
@@ -92,7 +93,7 @@ fn job_of(scene: &ReferenceScene, folder: &Path, format: &str, out: &Path) -> Va
     })
 }
 
-fn read(path: &Path) -> GltfScene {
+fn read(path: &Path) -> FileScene {
     gltf::read(path, None, &Limits::default()).unwrap()
 }
 

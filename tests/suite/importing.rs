@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_dataset::{TriangleMesh, glb};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::byte_from_unit;

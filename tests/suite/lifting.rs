@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use mateval_dataset::glb;
-use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, png_io};

@@ -22,7 +22,7 @@ use mateval_files::whole::write_whole;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_linear};
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::{LinearRgb, Picture, Texture, Wrap, png_io};
+use mateval_image::{LinearRgb, Picture, Texture, Wrap, npy_io, png_io};
 use serde_json::json;
 
 use crate::error::{BaselineError, LabelsError};
@@ -293,9 +293,8 @@ fn labels_of(clusters: &Path, scene: &SceneId, instance: &Instance, parts: u8) -
 fn checked_labels(path: &Path, instance: &Instance) -> Result<Vec<u8>, BaselineError> {
     let bad = |source: LabelsError| BaselineError::BadLabels { path: path.to_owned(), source };
     let bytes = mateval_files::untrusted::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.into()))?;
-    let file = npyz::NpyFile::new(bytes.as_slice()).map_err(|error| bad(error.into()))?;
-    let labels: u64 = file.shape().iter().try_fold(1_u64, |all, axis| all.checked_mul(*axis)).unwrap_or(u64::MAX);
-    if labels != instance.triangles as u64 {
+    let labels = npy_io::whole_numbers(&bytes).map_err(|error| bad(error.into()))?.len();
+    if labels != instance.triangles {
         let (instance, triangles) = (instance.id.to_string(), instance.triangles);
         return Err(bad(LabelsError::Count { labels, instance, triangles }));
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use mateval_files::FileError;
+use mateval_image::limits::Malformed;
 use mateval_procedural::ProceduralError;
 
 use crate::import::error::ImportError;
@@ -259,10 +260,12 @@ pub enum AdapterError {
 /// Why labels cannot be used for their instance.
 #[derive(Debug, thiserror::Error)]
 pub enum LabelsError {
-    /// The file cannot be read, is too large, or is not a NumPy file.
+    /// The file cannot be read or is too large.
     #[error(transparent)]
     Unreadable(#[from] std::io::Error),
+    #[error(transparent)]
+    Array(#[from] Malformed),
     /// The number of labels differs from the number of triangles.
     #[error("{labels} labels; '{instance}' has {triangles} triangles")]
-    Count { labels: u64, instance: String, triangles: usize },
+    Count { labels: usize, instance: String, triangles: usize },
 }

@@ -130,7 +130,7 @@ pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) ->
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use mateval_dataset::mesh::UvAtlas;
+    use mateval_dataset::uv_atlas::UvAtlas;
     use mateval_image::Picture;
 
     use super::FillRule;

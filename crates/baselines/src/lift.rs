@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::camera::Projection;
-use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_image::Picture;
 use mateval_tracer::Ray;
 use rayon::prelude::*;

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_dataset::mesh::UvAtlas;
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_files::FileError;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, png_io};

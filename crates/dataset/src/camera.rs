@@ -8,13 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Intrinsics {
-    /// Pixels in a row.
     pub width: u32,
-    /// Rows.
     pub height: u32,
-    /// Horizontal focal length in pixels.
     pub fx: f64,
-    /// Vertical focal length in pixels.
     pub fy: f64,
     /// Column of the principal point, in pixels from the left edge.
     pub cx: f64,
@@ -25,13 +21,15 @@ pub struct Intrinsics {
 impl Intrinsics {
     /// Intrinsics with square pixels and the principal point in the middle; `fov_y` in radians.
     pub fn from_fov_y(width: u32, height: u32, fov_y: f64) -> Self {
-        let focal = f64::from(height) / 2.0 / libm::tan(fov_y / 2.0);
-        Self { width, height, fx: focal, fy: focal, cx: f64::from(width) / 2.0, cy: f64::from(height) / 2.0 }
+        Self::centred(width, height, f64::from(height) / 2.0 / libm::tan(fov_y / 2.0))
     }
 
     /// Intrinsics with square pixels and the principal point in the middle; `fov_x` in radians.
     pub fn from_fov_x(width: u32, height: u32, fov_x: f64) -> Self {
-        let focal = f64::from(width) / 2.0 / libm::tan(fov_x / 2.0);
+        Self::centred(width, height, f64::from(width) / 2.0 / libm::tan(fov_x / 2.0))
+    }
+
+    fn centred(width: u32, height: u32, focal: f64) -> Self {
         Self { width, height, fx: focal, fy: focal, cx: f64::from(width) / 2.0, cy: f64::from(height) / 2.0 }
     }
 }
@@ -83,23 +81,19 @@ impl Camera {
         Self { world_from_camera: matrix.transpose().to_cols_array_2d(), intrinsics }
     }
 
-    /// The camera moved by a vector.
     pub fn moved(mut self, by: DVec3) -> Self {
         self.world_from_camera.iter_mut().zip(by.to_array()).for_each(|(row, by)| row[3] += by);
         self
     }
 
-    /// `world_from_camera` as a matrix.
     pub fn matrix(&self) -> DMat4 {
         DMat4::from_cols_array_2d(&self.world_from_camera).transpose()
     }
 
-    /// The rotation from camera to world.
     pub fn rotation(&self) -> DMat3 {
         DMat3::from_mat4(self.matrix())
     }
 
-    /// The camera's position in the world.
     pub fn position(&self) -> DVec3 {
         self.matrix().w_axis.truncate()
     }
@@ -133,7 +127,6 @@ impl Camera {
         self.projection().project(world)
     }
 
-    /// A [`Projection`], for many points.
     pub fn projection(&self) -> Projection {
         Projection { camera_from_world: self.matrix().inverse(), intrinsics: self.intrinsics }
     }

@@ -51,7 +51,6 @@ impl DatasetFile {
         self.geometry.as_ref().map_or(&self.manifest_sha256, |geometry| &geometry.true_manifest_sha256)
     }
 
-    /// The perturbation of its geometry.
     pub fn perturbation(&self) -> Option<Perturbation> {
         self.geometry.as_ref().map(|geometry| geometry.perturbation)
     }
@@ -61,7 +60,6 @@ impl DatasetFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Licence {
-    /// The scene.
     pub scene: SceneId,
     /// The file that it came from, relative to the source.
     pub file: String,
@@ -83,9 +81,7 @@ pub struct TargetsFile {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
-    /// Its scene.
     pub scene: SceneId,
-    /// Its view.
     pub view: ViewId,
 }
 
@@ -95,9 +91,7 @@ pub struct Target {
 pub struct SceneFile {
     /// Always `mateval/3`.
     pub format: String,
-    /// The scene's id.
     pub id: SceneId,
-    /// Where it came from.
     pub source: SceneSource,
     /// The lights whose radiances track `fitted` fits: the scene's own, or a light stage's.
     pub lights: SceneLights,
@@ -125,7 +119,6 @@ pub struct SceneFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSource {
-    /// The kind of source.
     pub kind: SourceKind,
     /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
     pub house: String,
@@ -178,7 +171,6 @@ pub enum TrueMaterials {
     Source,
 }
 
-/// One file of a source.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceFile {
@@ -225,7 +217,6 @@ pub struct Instance {
     pub index: InstanceIndex,
     /// Its name in the source.
     pub name: String,
-    /// Its role in the scene.
     pub role: Role,
     /// Its category; null where the source does not state it.
     pub category: Option<String>,
@@ -240,13 +231,11 @@ pub struct Instance {
     pub atlas: Option<Atlas>,
 }
 
-/// An instance's uv atlas.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Atlas {
     /// Texels a side of the baked truth.
     pub size: u32,
-    /// Number of charts.
     pub charts: u32,
     /// Share of the square that charts cover, 0 to 1.
     pub coverage: f64,
@@ -305,7 +294,6 @@ impl SceneFile {
         std::iter::once((None, self.parts.as_slice())).chain(others)
     }
 
-    /// The view with this id.
     pub fn view(&self, id: &str) -> Option<&View> {
         self.views.iter().find(|view| view.id.as_str() == id)
     }
@@ -369,20 +357,15 @@ pub enum SourceKind {
     Bitterli,
     /// A room of a 3D-FRONT house.
     Front3d,
-    /// A glTF file.
     Gltf,
     /// A Blender file, which Blender baked.
     Blend,
 }
 
+/// The word that JSON files use.
 impl fmt::Display for SourceKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Bitterli => "bitterli",
-            Self::Front3d => "front3d",
-            Self::Gltf => "gltf",
-            Self::Blend => "blend",
-        })
+        self.serialize(f)
     }
 }
 
@@ -438,7 +421,6 @@ impl fmt::Display for PerturbationKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Perturbation {
-    /// The kind.
     pub kind: PerturbationKind,
     /// The level, from 1. True geometry has no perturbation.
     #[schemars(range(min = 1))]
@@ -489,17 +471,8 @@ mod tests {
     }
 
     #[test]
-    fn kinds_print_as_they_are_written() {
-        for kind in [SourceKind::Bitterli, SourceKind::Front3d, SourceKind::Gltf, SourceKind::Blend] {
-            assert_eq!(serde_json::to_value(kind).unwrap(), kind.to_string());
-        }
-    }
-
-    #[test]
     fn kinds_print_as_in_json() {
-        for kind in PerturbationKind::ALL {
-            assert_eq!(serde_json::to_value(kind).unwrap(), kind.to_string());
-        }
+        assert_eq!(SourceKind::Front3d.to_string(), "front3d");
         assert_eq!(Perturbation { kind: PerturbationKind::Pose, level: 2 }.to_string(), "pose 2");
     }
 }

@@ -1,11 +1,11 @@
 //! The one error of this crate.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use mateval_files::FileError;
 
 use crate::dataset::{FORMAT, PREVIOUS_FORMAT};
-use crate::findings::Finding;
+use crate::findings::{Finding, Severity};
 use crate::ids::{SceneId, quoted};
 
 /// Why a dataset or a part of it could not be read or written.
@@ -49,7 +49,6 @@ pub enum SceneError {
         path: PathBuf,
         /// Its format, shortened.
         found: String,
-        /// The format that this version reads.
         expected: &'static str,
     },
     /// A file that is valid, but of a kind that is not read here.
@@ -59,15 +58,8 @@ pub enum SceneError {
         /// What was found and what is supported.
         what: String,
     },
-    /// Scenes were requested that the dataset does not have.
     #[error("'{}' has no scene {}; it has {}", dataset.display(), quoted(unknown), quoted(known))]
-    UnknownScenes {
-        dataset: PathBuf,
-        /// The scenes that it does not have.
-        unknown: Vec<SceneId>,
-        /// All scenes that it has.
-        known: Vec<SceneId>,
-    },
+    UnknownScenes { dataset: PathBuf, unknown: Vec<SceneId>, known: Vec<SceneId> },
     /// Scenes that the dataset lists are needed and their folders are missing: download them.
     #[error(
         "the folders of {} of the {total} scenes that '{}' lists are missing: unpack {} in the dataset's folder",
@@ -83,9 +75,17 @@ pub enum SceneError {
     /// A file or folder could not be read, written or guarded.
     #[error(transparent)]
     Files(#[from] FileError),
-    /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
+}
+
+impl SceneError {
+    /// One fault of the file at `path`.
+    pub(crate) fn invalid(path: &Path, code: &str, place: String, message: String, action: &str) -> Self {
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let finding = Finding::new(Severity::Error, code, file, place, message, action);
+        Self::Invalid { path: path.to_owned(), findings: vec![finding] }
+    }
 }
 
 /// What helps where a file has another format than the one that is read.

@@ -6,7 +6,6 @@ use std::fmt::Write as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -22,7 +21,6 @@ pub enum Severity {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// How severe it is.
     pub severity: Severity,
     /// A stable word for the kind of fault, as in `missing_file`; snake_case.
     pub code: String,
@@ -40,11 +38,8 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FindingCount {
-    /// Their severity.
     pub severity: Severity,
-    /// Their code.
     pub code: String,
-    /// Their number.
     pub count: usize,
 }
 

@@ -11,12 +11,12 @@ use json::validation::{Checked, USize64};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 
+use crate::SceneError;
 use crate::gltf_file::{GltfError, indices, numbers, triangles};
 use crate::mesh::TriangleMesh;
-use crate::{Finding, SceneError, Severity};
 
 /// Largest file that is read, in bytes.
-pub const MAX_GLB_BYTES: u64 = 4 << 30;
+const MAX_GLB_BYTES: u64 = 4 << 30;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct GlbNode {
@@ -208,20 +208,19 @@ pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
 fn read_mesh(mesh: &gltf::Mesh<'_>, buffers: &[&[u8]]) -> Result<TriangleMesh, GltfError> {
     let mut primitives = mesh.primitives();
     let (Some(primitive), None) = (primitives.next(), primitives.next()) else {
-        return Err(GltfError::NotOnePrimitive { found: mesh.primitives().count() });
+        return Err(GltfError(format!("expected one primitive per mesh, found {}", mesh.primitives().count())));
     };
     let accessor = |semantic: gltf::Semantic| primitive.get(&semantic);
-    let Some(positions) = accessor(gltf::Semantic::Positions) else {
-        return Err(GltfError::Missing { attribute: "POSITION" });
-    };
+    let missing = |what: &str| GltfError(format!("expected {what}"));
+    let positions = accessor(gltf::Semantic::Positions).ok_or_else(|| missing("POSITION"))?;
     let positions: Vec<Vec3> = finite::<3>(&positions, buffers)?.into_iter().map(Vec3::from_array).collect();
     let normals = accessor(gltf::Semantic::Normals).map(|a| finite::<3>(&a, buffers)).transpose()?;
     let uvs = accessor(gltf::Semantic::TexCoords(0)).map(|a| finite::<2>(&a, buffers)).transpose()?;
-    let accessor = primitive.indices().ok_or(GltfError::Missing { attribute: "indices" })?;
+    let accessor = primitive.indices().ok_or_else(|| missing("indices"))?;
     let triangles = triangles(indices(&accessor, buffers)?, positions.len())?;
     let same_count = |count: Option<usize>| count.is_none_or(|count| count == positions.len());
     if !same_count(normals.as_ref().map(Vec::len)) || !same_count(uvs.as_ref().map(Vec::len)) {
-        return Err(GltfError::CountsDiffer);
+        return Err(missing("as many entries of NORMAL and TEXCOORD_0 as of POSITION"));
     }
     Ok(TriangleMesh {
         positions,
@@ -236,20 +235,13 @@ fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, buffers: &[&[u8]]) -> R
     let values = numbers::<N>(accessor, buffers)?;
     match values.iter().position(|value| !value.iter().all(|v| v.is_finite())) {
         None => Ok(values),
-        Some(entry) => Err(GltfError::NotFinite { accessor: accessor.index(), entry }),
+        Some(entry) => Err(GltfError(format!("accessor {}: entry {entry} is not finite", accessor.index()))),
     }
 }
 
 fn invalid(path: &Path, node: &str, message: String) -> SceneError {
-    let finding = Finding::new(
-        Severity::Error,
-        "bad_geometry",
-        path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        if node.is_empty() { String::new() } else { format!("node '{node}'") },
-        message,
-        "fetch or build the dataset again",
-    );
-    SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
+    let place = if node.is_empty() { String::new() } else { format!("node '{node}'") };
+    SceneError::invalid(path, "bad_geometry", place, message, "fetch or build the dataset again")
 }
 
 #[cfg(test)]

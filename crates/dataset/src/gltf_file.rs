@@ -14,100 +14,18 @@ use mateval_files::untrusted::{hint, without_mark};
 use serde_json::{Map, Value};
 
 use crate::material::StatedParameters;
+use mateval_files::untrusted::shortened;
 
-/// Why a glTF file, or a part of it, cannot be read. Accessors and buffer views are named by their index in the file.
+/// Why a glTF file, or a part of it, cannot be read: what was expected, with its place, and what was found. Accessors and
+/// buffer views are named by their index in the file.
 #[derive(Debug, thiserror::Error)]
-pub enum GltfError {
-    /// The `gltf` crate refuses it.
-    #[error("not valid glTF: {0}")]
-    Unsound(#[from] gltf::Error),
-    /// It is not the JSON of a glTF.
-    #[error("not valid glTF: {reason}{hint}")]
-    NotJson {
-        reason: serde_json::Error,
-        /// What the file is instead, and what to do; empty where that is not known.
-        hint: String,
-    },
-    /// The picture of a texture exists in a format that is not read.
-    #[error(
-        "/textures/{texture}: its only picture is KTX2 (KHR_texture_basisu), which is not read; convert the file with \
-         `gltf-transform ktxdecompress`"
-    )]
-    OnlyKtx2 { texture: usize },
-    /// A binary file states a length that cannot hold its own header.
-    #[error("not valid glTF: a binary file that states a length of {length} bytes; its header alone has 12")]
-    StatedLength {
-        /// The length that the file states.
-        length: u32,
-    },
-    /// An attribute of a mesh names an accessor that the file does not have.
-    #[error("not valid glTF: an attribute names an accessor that does not exist")]
-    NoAccessor,
-    /// An image has neither a file nor a buffer view with its type.
-    #[error("/images/{image}: expected `uri`, or `bufferView` and `mimeType`")]
-    NoImageSource { image: usize },
-    /// A camera lacks the projection of its type.
-    #[error("/cameras/{camera}: expected a projection of the camera's type")]
-    NoProjection { camera: usize },
-    /// The entries of an accessor hold another number of numbers.
-    #[error("accessor {accessor}: expected {expected} numbers an entry, found {found}")]
-    OtherNumbers {
-        accessor: usize,
-        /// Numbers an entry that are needed.
-        expected: usize,
-        /// Numbers an entry that it has.
-        found: usize,
-    },
-    /// An accessor states too many entries.
-    #[error("accessor {accessor}: expected at most {most} bytes, found more")]
-    AccessorTooLarge {
-        accessor: usize,
-        /// The most bytes of its contents.
-        most: usize,
-    },
-    /// An entry of an accessor is NaN or infinite.
-    #[error("accessor {accessor}: entry {entry} is not finite")]
-    NotFinite { accessor: usize, entry: usize },
-    /// An accessor that should hold indices holds something else.
-    #[error("accessor {accessor}: expected indices, found {found:?}")]
-    NotIndices {
-        accessor: usize,
-        /// The type of its numbers.
-        found: DataType,
-    },
-    /// An accessor of indices holds several an entry.
-    #[error("accessor {accessor}: expected one index an entry")]
-    NotOneIndex { accessor: usize },
-    /// An index names a vertex that the mesh does not have.
-    #[error("index {at} is {index}, expected less than {vertices}")]
-    IndexOutOfRange {
-        /// Its place among the indices.
-        at: usize,
-        index: u32,
-        /// Vertices of the mesh.
-        vertices: usize,
-    },
-    /// The number of indices is not a multiple of three.
-    #[error("{indices} indices, expected three a triangle")]
-    NotTriangles { indices: usize },
-    /// A buffer view reaches outside its buffer.
-    #[error("buffer view {view} reaches outside its buffer")]
-    ViewOutside { view: usize },
-    /// An accessor reaches outside its buffer.
-    #[error("accessor {accessor} reaches outside its buffer")]
-    AccessorOutside { accessor: usize },
-    /// A mesh of no primitive, or of several.
-    #[error("expected one primitive per mesh, found {found}")]
-    NotOnePrimitive { found: usize },
-    /// A mesh lacks an attribute or its indices.
-    #[error("expected {attribute}")]
-    Missing {
-        /// As in `POSITION`.
-        attribute: &'static str,
-    },
-    /// The attributes of a mesh differ in length.
-    #[error("expected as many entries of NORMAL and TEXCOORD_0 as of POSITION")]
-    CountsDiffer,
+#[error("{0}")]
+pub struct GltfError(pub String);
+
+impl GltfError {
+    fn not_valid(reason: impl std::fmt::Display) -> Self {
+        Self(format!("not valid glTF: {reason}"))
+    }
 }
 
 /// Length of a binary file's header, in bytes.
@@ -124,7 +42,6 @@ const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 pub struct GltfFile {
     /// The JSON, validated. No material refers to a texture without a picture.
     pub document: gltf::Document,
-    /// The binary part of a GLB.
     pub blob: Option<Vec<u8>>,
     /// For each material, which parameters the file states; the others are defaults of the format.
     pub stated: Vec<StatedParameters>,
@@ -147,14 +64,13 @@ pub fn parse(bytes: &[u8]) -> Result<GltfFile, GltfError> {
     let text = without_mark(&json);
     let text = &text[..text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1)];
     let mut file: Value =
-        serde_json::from_slice(text).map_err(|reason| GltfError::NotJson { reason, hint: hint(text).into_owned() })?;
+        serde_json::from_slice(text).map_err(|reason| GltfError::not_valid(format!("{reason}{}", hint(text))))?;
     use_webp(&mut file);
     give_scenes_nodes(&mut file);
     require_others_only(&mut file);
     let without_picture = take_textures_without_picture(&mut file)?;
     let stated = list(&file, "materials").iter().map(stated_parameters).collect();
-    let root: gltf::json::Root =
-        serde_json::from_value(file).map_err(|reason| GltfError::NotJson { reason, hint: String::new() })?;
+    let root: gltf::json::Root = serde_json::from_value(file).map_err(GltfError::not_valid)?;
     let document = checked(root)?;
     Ok(GltfFile { document, blob, stated, without_picture })
 }
@@ -163,9 +79,10 @@ fn chunks(bytes: &[u8]) -> Result<(Vec<u8>, Option<Vec<u8>>), GltfError> {
     // The gltf crate subtracts the header from the length that a binary file states, without checking that length.
     let stated = bytes.get(8..12).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     if let Some(length) = stated.filter(|length| *length < GLB_HEADER) {
-        return Err(GltfError::StatedLength { length });
+        let what = format!("a binary file that states a length of {length} bytes; its header alone has {GLB_HEADER}");
+        return Err(GltfError::not_valid(what));
     }
-    let glb = Glb::from_slice(bytes)?;
+    let glb = Glb::from_slice(bytes).map_err(GltfError::not_valid)?;
     Ok((glb.json.into_owned(), glb.bin.map(std::borrow::Cow::into_owned)))
 }
 
@@ -207,7 +124,9 @@ fn take_textures_without_picture(file: &mut Value) -> Result<Vec<String>, GltfEr
     let is_ktx2 = |texture: &Value| texture.pointer(&format!("/extensions/{KTX2}")).is_some();
     let only_ktx2 = textures.iter().position(|texture| texture.get("source").is_none() && is_ktx2(texture));
     if let Some(texture) = only_ktx2 {
-        return Err(GltfError::OnlyKtx2 { texture });
+        let way_out = "convert the file with `gltf-transform ktxdecompress`";
+        let what = format!("its only picture is KTX2 ({KTX2}), which is not read; {way_out}");
+        return Err(GltfError(format!("/textures/{texture}: {what}")));
     }
     let mut pointers = Vec::new();
     if !absent.contains(&true) {
@@ -278,7 +197,7 @@ fn checked(root: gltf::json::Root) -> Result<gltf::Document, GltfError> {
     // The gltf crate's own validation looks up the accessor of the positions before it checks that the accessor exists.
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
     if primitives.flat_map(|primitive| primitive.attributes.values()).any(|at| at.value() >= root.accessors.len()) {
-        return Err(GltfError::NoAccessor);
+        return Err(GltfError::not_valid("an attribute names an accessor that does not exist"));
     }
     check_sources(&root)?;
     let mut faults = Vec::new();
@@ -291,10 +210,17 @@ fn checked(root: gltf::json::Root) -> Result<gltf::Document, GltfError> {
             faults.push((path, fault));
         }
     });
-    if !faults.is_empty() {
-        return Err(gltf::Error::Validation(faults).into());
-    }
-    Ok(gltf::Document::from_json_without_validation(root))
+    let Some((path, reason)) = faults.first() else {
+        return Ok(gltf::Document::from_json_without_validation(root));
+    };
+    let more = match faults.len() - 1 {
+        0 => String::new(),
+        1 => ", and 1 more fault".to_owned(),
+        more => format!(", and {more} more faults"),
+    };
+    // A path of the gltf crate, as in `meshes[0].name`, becomes the JSON pointer `/meshes/0/name`.
+    let pointer = path.as_str().replace(['.', '['], "/").replace([']', '"'], "");
+    Err(GltfError(format!("{}: {reason}{more}", shortened(&format!("/{pointer}")))))
 }
 
 /// Fails where an image states no place of its bytes, or a camera no projection of its type. The gltf crate assumes
@@ -305,7 +231,7 @@ fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
         None => image.uri.is_some(),
     };
     if let Some(image) = root.images.iter().position(|image| !has_source(image)) {
-        return Err(GltfError::NoImageSource { image });
+        return Err(GltfError(format!("/images/{image}: expected `uri`, or `bufferView` and `mimeType`")));
     }
     let has_projection = |camera: &gltf::json::Camera| match camera.type_ {
         Checked::Valid(Type::Perspective) => camera.perspective.is_some(),
@@ -313,7 +239,7 @@ fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
         Checked::Invalid => false,
     };
     match root.cameras.iter().position(|camera| !has_projection(camera)) {
-        Some(camera) => Err(GltfError::NoProjection { camera }),
+        Some(camera) => Err(GltfError(format!("/cameras/{camera}: expected a projection of the camera's type"))),
         None => Ok(()),
     }
 }
@@ -327,11 +253,19 @@ pub fn numbers<const N: usize>(
     accessor: &gltf::Accessor<'_>,
     buffers: &[impl AsRef<[u8]>],
 ) -> Result<Vec<[f32; N]>, GltfError> {
-    let found = accessor.dimensions().multiplicity();
-    if found != N {
-        return Err(GltfError::OtherNumbers { accessor: accessor.index(), expected: N, found });
-    }
+    check_numbers(accessor, N, |found| found == N)?;
     first_numbers(accessor, buffers)
+}
+
+/// The number of numbers an entry.
+fn check_numbers(
+    accessor: &gltf::Accessor<'_>,
+    expected: usize,
+    fits: impl Fn(usize) -> bool,
+) -> Result<usize, GltfError> {
+    let (index, found) = (accessor.index(), accessor.dimensions().multiplicity());
+    let refused = || GltfError(format!("accessor {index}: expected {expected} numbers an entry, found {found}"));
+    if fits(found) { Ok(found) } else { Err(refused()) }
 }
 
 /// As [`numbers`], of accessors that may have more than `N` numbers per entry; the first `N` count.
@@ -339,10 +273,7 @@ pub fn first_numbers<const N: usize>(
     accessor: &gltf::Accessor<'_>,
     buffers: &[impl AsRef<[u8]>],
 ) -> Result<Vec<[f32; N]>, GltfError> {
-    let found = accessor.dimensions().multiplicity();
-    if found < N {
-        return Err(GltfError::OtherNumbers { accessor: accessor.index(), expected: N, found });
-    }
+    let found = check_numbers(accessor, N, |found| found >= N)?;
     let (data_type, normalized) = (accessor.data_type(), accessor.normalized());
     let share = |value: f32, most: f32| if normalized { (value / most).max(-1.0) } else { value };
     let number = |bytes: &[u8]| match data_type {
@@ -365,10 +296,10 @@ pub fn indices(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>]) -> R
         DataType::U32 => 4,
         DataType::U16 => 2,
         DataType::U8 => 1,
-        found => return Err(GltfError::NotIndices { accessor: accessor.index(), found }),
+        found => return Err(GltfError(format!("accessor {}: expected indices, found {found:?}", accessor.index()))),
     };
     if accessor.dimensions().multiplicity() != 1 {
-        return Err(GltfError::NotOneIndex { accessor: accessor.index() });
+        return Err(GltfError(format!("accessor {}: expected one index an entry", accessor.index())));
     }
     Ok(entries(accessor, buffers, size)?.chunks_exact(size).map(word).collect())
 }
@@ -376,15 +307,18 @@ pub fn indices(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>]) -> R
 /// Splits indices into triangles. Fails where one is not below `vertices`, or their number is not a multiple of three.
 pub fn triangles(indices: Vec<u32>, vertices: usize) -> Result<Vec<[u32; 3]>, GltfError> {
     if let Some(at) = indices.iter().position(|index| *index as usize >= vertices) {
-        return Err(GltfError::IndexOutOfRange { at, index: indices[at], vertices });
+        return Err(GltfError(format!("index {at} is {}, expected less than {vertices}", indices[at])));
     }
     let (triangles, rest) = indices.as_chunks::<3>();
-    if rest.is_empty() { Ok(triangles.to_vec()) } else { Err(GltfError::NotTriangles { indices: indices.len() }) }
+    if !rest.is_empty() {
+        return Err(GltfError(format!("{} indices, expected three a triangle", indices.len())));
+    }
+    Ok(triangles.to_vec())
 }
 
 /// The bytes of a buffer view. Fails where it reaches outside its buffer.
 pub fn view_bytes<'a>(view: &gltf::buffer::View<'_>, buffers: &'a [impl AsRef<[u8]>]) -> Result<&'a [u8], GltfError> {
-    let outside = || GltfError::ViewOutside { view: view.index() };
+    let outside = || GltfError(format!("buffer view {} reaches outside its buffer", view.index()));
     let buffer = buffers.get(view.buffer().index()).ok_or_else(outside)?.as_ref();
     let start = view.offset();
     start.checked_add(view.length()).and_then(|end| buffer.get(start..end)).ok_or_else(outside)
@@ -398,7 +332,7 @@ fn word(bytes: &[u8]) -> u32 {
 /// The accessor's entries, of `size` bytes each, one after the other. Fails where they reach outside a buffer.
 fn entries(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>], size: usize) -> Result<Vec<u8>, GltfError> {
     let (index, count) = (accessor.index(), accessor.count());
-    let too_large = || GltfError::AccessorTooLarge { accessor: index, most: MOST_BYTES };
+    let too_large = || GltfError(format!("accessor {index}: expected at most {MOST_BYTES} bytes, found more"));
     let bytes = count.checked_mul(size).filter(|bytes| *bytes <= MOST_BYTES).ok_or_else(too_large)?;
     // The entries of the buffer view, or zeros.
     let mut all = match accessor.view() {
@@ -419,10 +353,14 @@ fn entries(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>], size: us
         for (place, value) in places.chunks_exact(number_size).map(word).zip(values.chunks_exact(size)) {
             let start = place as usize * size;
             let target = all.get_mut(start..start + size);
-            target.ok_or(GltfError::AccessorOutside { accessor: index })?.copy_from_slice(value);
+            target.ok_or_else(|| outside(index))?.copy_from_slice(value);
         }
     }
     Ok(all)
+}
+
+fn outside(accessor: usize) -> GltfError {
+    GltfError(format!("accessor {accessor} reaches outside its buffer"))
 }
 
 /// `count` entries of `size` bytes from `offset` of a buffer view on, without the gaps between them.
@@ -434,12 +372,11 @@ fn strided(
     count: usize,
     size: usize,
 ) -> Result<Vec<u8>, GltfError> {
-    let outside = || GltfError::AccessorOutside { accessor };
-    let slice = view_bytes(view, buffers).map_err(|_| outside())?;
+    let slice = view_bytes(view, buffers).map_err(|_| outside(accessor))?;
     let stride = view.stride().unwrap_or(size).max(size);
     let used = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
     let end = used.and_then(|used| used.checked_add(offset)).filter(|end| *end <= slice.len());
-    let data = slice.get(offset..end.ok_or_else(outside)?).ok_or_else(outside)?;
+    let data = slice.get(offset..end.ok_or_else(|| outside(accessor))?).ok_or_else(|| outside(accessor))?;
     Ok((0..count).flat_map(|at| &data[at * stride..at * stride + size]).copied().collect())
 }
 
@@ -461,7 +398,7 @@ mod tests {
         for length in [0_u32, 11, 12, u32::MAX] {
             let bytes = [&b"glTF"[..], &2_u32.to_le_bytes(), &length.to_le_bytes(), &[0; 8]].concat();
             let found = parse(&bytes).unwrap_err();
-            assert_eq!(matches!(found, GltfError::StatedLength { .. }), length < 12, "{found}");
+            assert_eq!(found.to_string().contains("its header alone has 12"), length < 12, "{found}");
         }
     }
 

@@ -5,12 +5,14 @@ use std::borrow::Cow;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use mateval_files::untrusted::shortened;
+
 /// The pattern of every id, which is safe as the name of a folder on every system.
-pub const ID_PATTERN: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
+const ID_PATTERN: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
 
 /// A text that is not an id.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{}' is not an id: expected {ID_PATTERN}", .0.chars().take(80).collect::<String>().escape_debug())]
+#[error("'{}' is not an id: expected {ID_PATTERN}", shortened(.0))]
 pub struct BadId(pub String);
 
 fn is_id(text: &str) -> bool {

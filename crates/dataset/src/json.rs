@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::ser::{Formatter, PrettyFormatter};
 use serde_path_to_error::Segment;
 
-use crate::{Finding, SceneError, Severity};
+use crate::SceneError;
 use mateval_files::untrusted::shortened;
 
 /// Largest JSON file that is read, in bytes.
@@ -145,15 +145,13 @@ fn pointer<T: DeserializeOwned>(text: &[u8]) -> String {
 }
 
 fn invalid(path: &Path, place: String, message: String) -> SceneError {
-    let finding = Finding::new(
-        Severity::Error,
+    SceneError::invalid(
+        path,
         "bad_json",
-        path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         place,
         message,
         "fix the file; `mateval prep verify` lists every fault of a dataset",
-    );
-    SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
+    )
 }
 
 #[cfg(test)]

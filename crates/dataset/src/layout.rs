@@ -43,7 +43,6 @@ pub fn is_rendered(file: &str) -> bool {
     file.contains("/ground_truth/renders/") || file.starts_with("ground_truth/renders/")
 }
 
-/// The paths of one scene.
 #[derive(Clone, Debug)]
 pub struct SceneFolder(PathBuf);
 
@@ -72,7 +71,6 @@ impl SceneFolder {
         self.0.join("geometry/instances.glb")
     }
 
-    /// See [`parts_file`].
     pub fn parts(&self, set: Option<&PartSetId>) -> PathBuf {
         self.0.join(parts_file(set))
     }
@@ -155,7 +153,6 @@ impl BuildFolder {
         self.0.join("key.json")
     }
 
-    /// The recipe of the build.
     pub fn recipe(&self) -> PathBuf {
         self.0.join("recipe.toml")
     }

@@ -2,10 +2,10 @@
 //!
 //! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
-//! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mod@mesh`], [`material`] and
+//! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mod@mesh`], [`uv_atlas`], [`material`] and
 //! [`mod@reference`] describe a scene with its materials and lights. [`dataset`], [`layout`], [`manifest`], [`open`]
-//! and [`render_file`] are the files of a dataset, [`submission`] those of a submission. [`obj`] and [`gltf_file`]
-//! read untrusted files.
+//! [`render_file`] and [`verdict`] are the files of a dataset, [`submission`] those of a submission. [`obj`] and
+//! [`gltf_file`] read untrusted files.
 
 pub mod camera;
 pub mod dataset;
@@ -28,6 +28,8 @@ pub mod scene_cost;
 pub mod specular_glossiness;
 pub mod splitmix64;
 pub mod submission;
+pub mod uv_atlas;
+pub mod verdict;
 pub mod word_enum;
 
 pub use camera::{Camera, Intrinsics};

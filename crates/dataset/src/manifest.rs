@@ -92,7 +92,6 @@ pub fn write_with(root: &Path, known: &BTreeMap<String, String>) -> Result<Strin
     Ok(sha256_of_bytes(text.as_bytes()))
 }
 
-/// A line of the manifest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
     /// SHA-256 of the file, hex.

@@ -13,7 +13,6 @@ use mateval_files::untrusted::shortened;
 /// Positions farther from the origin than this are not exact enough as 32-bit floats.
 const NEAR: f64 = 1000.0;
 
-/// Limits on a file's geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjLimits {
     /// Most triangles, after polygons are split.
@@ -40,52 +39,14 @@ pub enum ObjFault {
         "more than {} triangles or {} corners, the rest of the scene's limit", .0.triangles, .0.corners
     )]
     TooLarge(ObjLimits),
-    /// A face of one or two corners.
-    #[error("expected a face of 3 or more corners, found {found}")]
-    TooFewCorners { found: usize },
-    /// A word of a face that is not an index.
-    #[error("expected an index of a {what}, found '{}'", shortened(found))]
-    NotAnIndex {
-        /// As in `position`.
-        what: &'static str,
-        found: String,
-    },
-    /// An index of something that the file has not defined before.
-    #[error("the index {index} of a {what} is out of range: {count} came before it")]
-    IndexOutOfRange {
-        index: i64,
-        /// As in `position`.
-        what: &'static str,
-        /// How many the file holds before this line.
-        count: i64,
-    },
-    /// A corner of more than three parts.
-    #[error("expected position/uv/normal, found '{}'", shortened(found))]
-    NotACorner { found: String },
-    /// A colour that has neither one number nor three.
-    #[error("Kd: expected one number or three, found {found}")]
-    NotAColor { found: usize },
-    /// A property of a material that is not a finite number.
-    #[error("{key} of '{}': expected finite numbers", shortened(material))]
-    NotFinite {
-        /// As in `Pr`.
-        key: &'static str,
-        material: String,
-    },
-    /// It is a file of another kind.
-    #[error("expected text of an OBJ or MTL file{hint}")]
-    OtherKind {
-        /// What it is instead, and what to do.
-        hint: String,
-    },
-    /// The `tobj` crate cannot read it.
-    #[error(transparent)]
-    Unsound(#[from] tobj::LoadError),
+    /// What was expected and what was found.
+    #[error("{0}")]
+    Invalid(String),
 }
 
-impl From<ObjFault> for ObjError {
-    fn from(fault: ObjFault) -> Self {
-        Self { line: None, fault }
+impl From<tobj::LoadError> for ObjError {
+    fn from(error: tobj::LoadError) -> Self {
+        Self { line: None, fault: ObjFault::Invalid(error.to_string()) }
     }
 }
 
@@ -95,7 +56,6 @@ pub struct ObjGroup {
     pub name: String,
     /// The name after `usemtl`; none without one, and under [`Materials::Ignored`].
     pub material: Option<String>,
-    /// How many triangles it has.
     pub triangles: usize,
 }
 
@@ -209,7 +169,10 @@ fn relative_to(text: &str, base: DVec3) -> String {
 /// The text without a byte order mark, whose lines end in LF or CRLF. Fails where the file is of another kind.
 fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ObjError> {
     match mistaken_for(bytes) {
-        Some(_) if !bytes.is_empty() => Err(ObjFault::OtherKind { hint: hint(bytes).into_owned() }.into()),
+        Some(_) if !bytes.is_empty() => {
+            let what = format!("expected text of an OBJ or MTL file{}", hint(bytes));
+            Err(ObjError { line: None, fault: ObjFault::Invalid(what) })
+        }
         _ => Ok(with_line_ends(String::from_utf8_lossy(without_mark(bytes)))),
     }
 }
@@ -246,7 +209,8 @@ fn check_line(line: &str, census: &mut Census) -> Result<(), ObjFault> {
                 corners += 1;
             }
             if corners < 3 {
-                return Err(ObjFault::TooFewCorners { found: corners });
+                let what = format!("expected a face of 3 or more corners, found {corners}");
+                return Err(ObjFault::Invalid(what));
             }
             census.corners += corners;
             census.triangles += corners - 2;
@@ -263,12 +227,14 @@ fn check_corner(corner: &str, census: &mut Census) -> Result<(), ObjFault> {
         None | Some("") if !required => Ok(false),
         part => {
             let part = part.unwrap_or("");
-            let number: i64 = part.parse().map_err(|_| ObjFault::NotAnIndex { what, found: part.to_owned() })?;
+            let refused = || format!("expected an index of a {what}, found '{}'", shortened(part));
+            let number: i64 = part.parse().map_err(|_| ObjFault::Invalid(refused()))?;
             let place = if number < 0 { number.saturating_add(count).saturating_add(1) } else { number };
             if (1..=count).contains(&place) {
                 Ok(true)
             } else {
-                Err(ObjFault::IndexOutOfRange { index: number, what, count })
+                let what = format!("the index {number} of a {what} is out of range: {count} came before it");
+                Err(ObjFault::Invalid(what))
             }
         }
     };
@@ -276,7 +242,8 @@ fn check_corner(corner: &str, census: &mut Census) -> Result<(), ObjFault> {
     census.corners_with_uv += usize::from(index(census.uvs, "texture coordinate", false)?);
     census.corners_with_normal += usize::from(index(census.normals, "normal", false)?);
     if parts.next().is_some() {
-        return Err(ObjFault::NotACorner { found: corner.to_owned() });
+        let what = format!("expected position/uv/normal, found '{}'", shortened(corner));
+        return Err(ObjFault::Invalid(what));
     }
     Ok(())
 }
@@ -322,15 +289,19 @@ pub fn material_files(bytes: &[u8]) -> Vec<String> {
 /// Reads an MTL file. Every number must be finite; a single number after `Kd` stands for all three.
 pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
     let text = with_whole_colors(&text_of(bytes)?)?;
-    let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).map_err(ObjFault::Unsound)?;
+    let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())?;
+    let not_finite = |key: &str, material: &tobj::Material| {
+        let what = format!("{key} of '{}': expected finite numbers", shortened(&material.name));
+        ObjError { line: None, fault: ObjFault::Invalid(what) }
+    };
     let number = |material: &tobj::Material, key: &'static str| {
         let Some(word) = material.unknown_param.get(key) else { return Ok(None) };
         let value = word.trim().parse::<f32>().ok().filter(|value| value.is_finite());
-        value.map(Some).ok_or_else(|| ObjFault::NotFinite { key, material: material.name.clone() })
+        value.map(Some).ok_or_else(|| not_finite(key, material))
     };
     let read = |material: tobj::Material| {
         if material.diffuse.is_some_and(|rgb| !rgb.iter().all(|v| v.is_finite())) {
-            return Err(ObjFault::NotFinite { key: "Kd", material: material.name }.into());
+            return Err(not_finite("Kd", &material));
         }
         let (roughness, metallic) = (number(&material, "Pr")?, number(&material, "Pm")?);
         let map = |key: &str| material.unknown_param.get(key).map(|name| name.trim().to_owned());
@@ -351,7 +322,7 @@ fn with_whole_colors(text: &str) -> Result<String, ObjError> {
             ["Ka" | "Ks" | "Ke", ..] => {}
             ["Kd", grey] => out.push_str(&format!("Kd {grey} {grey} {grey}")),
             ["Kd", ref rest @ ..] if rest.len() < 3 => {
-                let fault = ObjFault::NotAColor { found: rest.len() };
+                let fault = ObjFault::Invalid(format!("Kd: expected one number or three, found {}", rest.len()));
                 return Err(ObjError { line: Some(at + 1), fault });
             }
             _ => out.push_str(line),
@@ -375,7 +346,7 @@ fn load(text: &str, materials: Materials) -> Result<ObjMesh, ObjError> {
     };
     let with_materials = (!names.is_empty()).then(|| format!("mtllib any\n{}", without_material_files(text)));
     let text = with_materials.as_deref().unwrap_or(text);
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(ObjFault::Unsound)?;
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined)?;
     let mut mesh = TriangleMesh { uvs: Some(Vec::new()), normals: Some(Vec::new()), ..Default::default() };
     let (mut groups, mut colors) = (Vec::new(), Vec::new());
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {

@@ -17,7 +17,6 @@ use crate::{Finding, RendererId, SceneError, SceneId, Severity, SourceKind, View
 /// A finished dataset on disk.
 #[derive(Clone, Debug)]
 pub struct Dataset {
-    /// Its folder.
     pub root: PathBuf,
     pub file: DatasetFile,
     /// `targets.json`, what is scored.
@@ -86,10 +85,7 @@ impl Dataset {
     }
 
     fn check_present(&self, absent: Vec<SceneId>) -> Result<(), SceneError> {
-        if absent.is_empty() {
-            return Ok(());
-        }
-        Err(SceneError::AbsentScenes { dataset: self.root.clone(), absent, total: self.file.scenes.len() })
+        check_none_absent(&self.root, &self.file, absent)
     }
 
     /// For work on the scenes that exist: a sentence that states how many are absent, or none where all exist.
@@ -126,7 +122,10 @@ pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Re
 
 /// Fails where the folder of a scene that `file`, the `dataset.json` in `root`, lists is missing.
 pub fn check_whole(root: &Path, file: &DatasetFile) -> Result<(), SceneError> {
-    let absent = absent_scenes(root, file)?;
+    check_none_absent(root, file, absent_scenes(root, file)?)
+}
+
+fn check_none_absent(root: &Path, file: &DatasetFile, absent: Vec<SceneId>) -> Result<(), SceneError> {
     if absent.is_empty() {
         return Ok(());
     }
@@ -190,22 +189,14 @@ fn together(root: &Path, mut faults: Vec<(String, SceneError)>) -> SceneError {
         SceneError::Invalid { findings, .. } => {
             findings.into_iter().map(|finding| Finding { file: file.clone(), ..finding }).collect()
         }
-        other => vec![unreadable(file, &other)],
+        other => {
+            let action = "`mateval prep verify` lists every fault of a dataset";
+            vec![Finding::new(Severity::Error, "unreadable", file, "", other.to_string(), action)]
+        }
     });
     let mut findings: Vec<Finding> = all.collect();
     findings.sort();
     SceneError::Invalid { path: root.to_owned(), findings }
-}
-
-fn unreadable(file: String, fault: &SceneError) -> Finding {
-    Finding::new(
-        Severity::Error,
-        "unreadable",
-        file,
-        "",
-        fault.to_string(),
-        "`mateval prep verify` lists every fault of a dataset",
-    )
 }
 
 fn read_targets(root: &Path) -> Result<TargetsFile, SceneError> {
@@ -244,9 +235,7 @@ fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), Scen
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetId {
-    /// Its name.
     pub name: String,
-    /// Its version.
     pub version: String,
     /// SHA-256 of its manifest, hex.
     pub manifest_sha256: String,

@@ -25,12 +25,10 @@ pub enum Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    /// A report of a part of the whole.
     pub fn part(name: &'a str, done: usize, total: usize) -> Self {
         Self::Part { name, done, total }
     }
 
-    /// A report of a step.
     pub fn step(name: &'a str, done: usize, total: usize) -> Self {
         Self::Step { name, done, total }
     }
@@ -49,7 +47,6 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
-/// A row of a table.
 pub fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
     cells.map(str::to_owned).to_vec()
 }

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::dataset::{FORMAT, SceneFile};
 use crate::glb::{self, GlbNode};
 use crate::layout::SceneFolder;
-use crate::material::{ColorInput, Lookup, Material, MaterialModel, TextureIndex, UvTransform};
+use crate::material::{Lookup, Material, MaterialModel, TextureIndex, UvTransform};
 use crate::mesh::TriangleMesh;
 use crate::{Finding, SceneError, Severity, json};
 
@@ -43,7 +43,6 @@ pub struct LightIndex(pub usize);
 pub struct Surface {
     /// Its name in the source, not necessarily unique.
     pub name: String,
-    /// Its triangles in world space.
     pub mesh: TriangleMesh,
     pub material: MaterialIndex,
 }
@@ -56,6 +55,13 @@ pub struct SourceTexture {
     /// SHA-256 of the file's bytes, hex; none for a computed one.
     pub sha256: Option<String>,
     pub texture: Texture,
+}
+
+impl SourceTexture {
+    /// A texture that no file holds.
+    pub fn computed(name: impl Into<String>, texture: Texture) -> Self {
+        Self { name: name.into(), sha256: None, texture }
+    }
 }
 
 /// A texture that varies the radiance of an emitting surface from place to place, as on a lamp's shade.
@@ -82,9 +88,7 @@ impl EmissionMap {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Emission {
-    /// Surfaces that emit light.
     Area {
-        /// The surfaces that emit.
         surfaces: Vec<SurfaceIndex>,
         /// Linear Rec. 709 radiance, W/(m^2 sr) in the scene's own unit.
         radiance: [f32; 3],
@@ -128,7 +132,6 @@ pub struct LightGroup {
 pub struct ReferenceScene {
     /// All surfaces, including glass and lamps.
     pub surfaces: Vec<Surface>,
-    /// The materials of the surfaces.
     pub materials: Vec<Material>,
     /// The textures of materials and lights.
     pub textures: Vec<SourceTexture>,
@@ -136,6 +139,16 @@ pub struct ReferenceScene {
 }
 
 impl ReferenceScene {
+    pub fn add_material(&mut self, material: Material) -> MaterialIndex {
+        self.materials.push(material);
+        MaterialIndex(self.materials.len() - 1)
+    }
+
+    pub fn add_texture(&mut self, texture: SourceTexture) -> TextureIndex {
+        self.textures.push(texture);
+        TextureIndex(self.textures.len() - 1)
+    }
+
     /// The textures alone, for [`Material::appearance`]. Texels are shared, not copied.
     pub fn texture_list(&self) -> Vec<Texture> {
         self.textures.iter().map(|source| source.texture.clone()).collect()
@@ -188,7 +201,6 @@ pub struct ReferenceFile {
     pub format: String,
     /// In the order of the nodes of `geometry.glb`.
     pub surfaces: Vec<SurfaceEntry>,
-    /// The materials of the surfaces.
     pub materials: Vec<Material>,
     /// The textures of materials and lights.
     pub textures: Vec<TextureEntry>,
@@ -206,7 +218,6 @@ pub struct SourceMaterialsFile {
     pub textures: Vec<TextureEntry>,
 }
 
-/// One surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceEntry {
@@ -216,7 +227,6 @@ pub struct SurfaceEntry {
     pub material: MaterialIndex,
 }
 
-/// One texture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TextureEntry {
@@ -226,10 +236,9 @@ pub struct TextureEntry {
     pub source: String,
     /// SHA-256 of that file, hex; null for a computed one.
     pub source_sha256: Option<String>,
-    /// How its numbers are stored.
     pub texels: TexelKind,
     /// How it continues outside 0..1: `repeat`, `clamp` or `mirror`.
-    pub wrap: WrapWord,
+    pub wrap: Wrap,
 }
 
 /// How a texture's numbers are stored.
@@ -248,38 +257,6 @@ pub enum TexelKind {
     Linear,
     /// Float EXR `V`.
     Grey,
-}
-
-/// How a texture continues outside 0..1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum WrapWord {
-    /// The picture again.
-    Repeat,
-    /// The border texel.
-    Clamp,
-    /// Mirrored every other time.
-    Mirror,
-}
-
-impl From<Wrap> for WrapWord {
-    fn from(wrap: Wrap) -> Self {
-        match wrap {
-            Wrap::Repeat => Self::Repeat,
-            Wrap::Clamp => Self::Clamp,
-            Wrap::Mirror => Self::Mirror,
-        }
-    }
-}
-
-impl From<WrapWord> for Wrap {
-    fn from(word: WrapWord) -> Self {
-        match word {
-            WrapWord::Repeat => Self::Repeat,
-            WrapWord::Clamp => Self::Clamp,
-            WrapWord::Mirror => Self::Mirror,
-        }
-    }
 }
 
 /// `lights.json`.
@@ -406,14 +383,14 @@ fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<
             (exr, TexelKind::Grey)
         }
     };
-    let wrap = texture.wrap().into();
+    let wrap = texture.wrap();
     let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(TextureEntry { file, source: source.name.clone(), source_sha256: source.sha256.clone(), texels, wrap })
 }
 
 fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTexture, SceneError> {
     let path = reference.join("textures").join(&entry.file);
-    let wrap = entry.wrap.into();
+    let wrap = entry.wrap;
     let texture = match entry.texels {
         TexelKind::Srgb8 | TexelKind::Srgb16 => read_texture(&path, Encoding::Srgb, wrap)?,
         TexelKind::Linear8 | TexelKind::Grey8 | TexelKind::Linear => read_texture(&path, Encoding::Linear, wrap)?,
@@ -430,14 +407,8 @@ struct Faults(Vec<Finding>);
 
 impl Faults {
     fn add(&mut self, file: &str, place: impl Into<String>, message: String) {
-        self.0.push(Finding::new(
-            Severity::Error,
-            "dangling_reference",
-            file,
-            place.into(),
-            message,
-            "fetch or build the dataset again",
-        ));
+        let action = "fetch or build the dataset again";
+        self.0.push(Finding::new(Severity::Error, "dangling_reference", file, place, message, action));
     }
 
     /// Adds every texture's file name that leads out of `textures/`, and every index of a texture out of range.
@@ -506,13 +477,7 @@ pub fn read_plain(folder: &SceneFolder, scene: &SceneFile) -> Result<ReferenceSc
         return Err(SceneError::Unsupported { path, what });
     }
     let surface = |node: glb::GlbNode| Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) };
-    let grey = Material {
-        name: String::new(),
-        model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
-        two_sided: true,
-        opacity: None,
-        bump: None,
-    };
+    let grey = Material::new("", MaterialModel::grey(0.5));
     let surfaces = nodes.into_iter().map(surface).collect();
     Ok(ReferenceScene { surfaces, materials: vec![grey], ..ReferenceScene::default() })
 }
@@ -522,7 +487,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::material::ScalarInput;
+    use crate::material::{ColorInput, ScalarInput};
 
     fn scene() -> ReferenceScene {
         let mesh = TriangleMesh {
@@ -531,11 +496,8 @@ mod tests {
             uvs: None,
             triangles: vec![[0, 1, 2]],
         };
-        let texture = |name: &str, texels| SourceTexture {
-            name: name.to_owned(),
-            sha256: None,
-            texture: Texture::new(2, 1, texels, Wrap::Clamp).unwrap(),
-        };
+        let texture =
+            |name: &str, texels| SourceTexture::computed(name, Texture::new(2, 1, texels, Wrap::Clamp).unwrap());
         let uv = Default::default();
         ReferenceScene {
             surfaces: vec![Surface { name: "s".to_owned(), mesh, material: MaterialIndex(0) }],

@@ -16,7 +16,6 @@ use mateval_files::{FileError, work_folder};
 /// The format of this version of the file.
 const COST_FORMAT: &str = "mateval-cost/1";
 
-/// A step in the making of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Step {
@@ -28,15 +27,12 @@ pub enum Step {
     Scorer,
 }
 
-/// The cost of one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StepCost {
-    /// The step.
     pub step: Step,
     /// The renderer of the step `render`; null for the others.
     pub renderer: Option<RendererId>,
-    /// Number of runs.
     pub runs: usize,
     /// Elapsed time of all runs, in seconds.
     pub wall_seconds: f64,

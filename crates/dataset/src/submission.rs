@@ -110,7 +110,6 @@ pub fn instance_folder(submission: &Path, scene: &SceneId, instance: &InstanceId
     scene_folder(submission, scene).join(instance.as_str())
 }
 
-/// Transfer function of stored numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StoredEncoding {

@@ -44,7 +44,7 @@ impl Profile {
     /// The profile that a file states; none for sRGB and for a file without any. Fails where it can neither be applied
     /// nor taken for sRGB.
     pub(crate) fn of(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ImageError> {
-        let unsupported = |what: String| ImageError::Unsupported { path: path.to_owned(), what };
+        let unsupported = |what: String| ImageError::unsupported(path, what);
         let unreadable = || unsupported(format!("its colour profile {UNREADABLE}"));
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok();
         let Some(mut decoder) = reader.and_then(|reader| reader.into_decoder().ok()) else {

@@ -14,7 +14,7 @@ use exr::prelude as ex;
 use exr::prelude::traits::*;
 use half::f16;
 
-use crate::limits::{check_size, read_file};
+use crate::limits::{Malformed, check_size, read_file};
 use crate::{ImageError, LinearRgb, Normal, Picture};
 use mateval_files::whole::write_whole;
 
@@ -28,7 +28,6 @@ const MAX_BLOCKS: usize = 1 << 20;
 pub enum Precision {
     /// 16 bits: 11 bits of mantissa, up to 65504.
     Half,
-    /// 32 bits.
     Float,
 }
 
@@ -154,7 +153,7 @@ pub fn write_channels(
         .write()
         .non_parallel()
         .to_buffered(&mut bytes)
-        .map_err(|error| ImageError::Unsupported { path: path.to_owned(), what: error.to_string() })?;
+        .map_err(|error| ImageError::unsupported(path, error.to_string()))?;
     Ok(write_whole(path, bytes.get_ref())?)
 }
 
@@ -189,35 +188,27 @@ fn channel(path: &Path, layer: &FlatLayer, name: &str) -> Result<Vec<f32>, Image
     let Some(found) = channels.iter().find(|channel| channel.name.eq(name)) else {
         let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
         let what = format!("expected a channel {name}, found {}", names.join(", "));
-        return Err(ImageError::Invalid { path: path.to_owned(), what });
+        return Err(ImageError::invalid(path, what));
     };
     if found.sampling != ex::Vec2(1, 1) {
         let what = format!("channel {name} is subsampled; expected one value a pixel");
-        return Err(ImageError::Unsupported { path: path.to_owned(), what });
+        return Err(ImageError::unsupported(path, what));
     }
     Ok(found.sample_data.values_as_f32().collect())
 }
 
-/// Fails where a header describes a layer that is too large.
+/// Fails where a header describes a layer that is too large: decoding takes memory in proportion to samples and blocks.
 fn check_headers(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    let meta =
-        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| invalid(path, &error))?;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| invalid(path, &error))?;
     for header in &meta.headers {
         check_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
-        check_amount(path, header)?;
+        let (samples, blocks) = (header.layer_size.area() * header.channels.list.len(), header.chunk_count);
+        if samples > MAX_SAMPLES || blocks > MAX_BLOCKS {
+            let what = format!("{samples} samples in {blocks} blocks; expected at most {MAX_SAMPLES} in {MAX_BLOCKS}");
+            return Err(ImageError::invalid(path, what));
+        }
     }
     Ok(())
-}
-
-/// Decoding takes memory in proportion to samples and blocks, so both are bounded before.
-fn check_amount(path: &Path, header: &exr::meta::header::Header) -> Result<(), ImageError> {
-    let samples = header.layer_size.area() * header.channels.list.len();
-    if samples <= MAX_SAMPLES && header.chunk_count <= MAX_BLOCKS {
-        return Ok(());
-    }
-    let blocks = header.chunk_count;
-    let what = format!("{samples} samples in {blocks} blocks; expected at most {MAX_SAMPLES} in {MAX_BLOCKS}");
-    Err(ImageError::Invalid { path: path.to_owned(), what })
 }
 
 fn check_finite(path: &Path, width: usize, mut finite: impl Iterator<Item = bool>) -> Result<(), ImageError> {
@@ -225,13 +216,13 @@ fn check_finite(path: &Path, width: usize, mut finite: impl Iterator<Item = bool
         None => Ok(()),
         Some(at) => {
             let what = format!("pixel ({}, {}) is NaN or infinite; expected finite numbers", at % width, at / width);
-            Err(ImageError::Invalid { path: path.to_owned(), what })
+            Err(ImageError::invalid(path, what))
         }
     }
 }
 
 fn invalid(path: &Path, error: &ex::Error) -> ImageError {
-    ImageError::Invalid { path: path.to_owned(), what: format!("not a valid OpenEXR file: {error}") }
+    ImageError::invalid(path, format!("not a valid OpenEXR file: {error}"))
 }
 
 /// The first bytes of an OpenEXR file.
@@ -240,14 +231,10 @@ pub const EXR_SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 /// The chromaticities x and y of the red, green, blue and white of Rec. 709.
 const REC_709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
 
-/// How a channel's numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExrNumber {
-    /// 16-bit float.
     Half,
-    /// 32-bit float.
     Float,
-    /// 32-bit unsigned integer.
     Whole,
 }
 
@@ -255,7 +242,6 @@ pub enum ExrNumber {
 pub struct ExrChannel {
     /// Its name, as in `R` or `ViewLayer.Combined.R`.
     pub name: String,
-    /// How its numbers are stored.
     pub number: ExrNumber,
     /// Whether it has a number only for some of the pixels.
     pub subsampled: bool,
@@ -284,22 +270,12 @@ pub struct ExrHeader {
     pub samples: usize,
 }
 
-/// Why the headers of an OpenEXR file cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum ExrHeaderError {
-    /// The `exr` crate cannot read it.
-    #[error(transparent)]
-    Unsound(#[from] exr::error::Error),
-    /// Nothing follows the file's version.
-    #[error("it has no parts")]
-    NoPart,
-}
-
 impl ExrHeader {
     /// Reads the headers of a file from its bytes. Fails where they are not valid.
-    pub fn of(bytes: &[u8]) -> Result<Self, ExrHeaderError> {
-        let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
-        let first = meta.headers.first().ok_or(ExrHeaderError::NoPart)?;
+    pub fn of(bytes: &[u8]) -> Result<Self, Malformed> {
+        let unsound = |error: ex::Error| Malformed(error.to_string());
+        let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(unsound)?;
+        let first = meta.headers.first().ok_or_else(|| Malformed("it has no parts".to_owned()))?;
         let display = first.shared_attributes.display_window.size;
         let samples = |header: &Header| {
             let pixels = header.layer_size.width().saturating_mul(header.layer_size.height());
@@ -318,7 +294,6 @@ impl ExrHeader {
         })
     }
 
-    /// The channel of this name.
     pub fn channel(&self, name: &str) -> Option<&ExrChannel> {
         self.channels.iter().find(|channel| channel.name == name)
     }

@@ -11,7 +11,6 @@ mod color_profile;
 pub mod exr_io;
 pub mod limits;
 pub mod npy_io;
-pub mod npy_numbers;
 pub mod photo;
 pub mod picture;
 pub mod png_io;

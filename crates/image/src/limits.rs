@@ -27,18 +27,26 @@ pub enum ImageError {
     },
     /// The number of pixels is not width times height.
     #[error("a picture of {width}x{height} needs {expected} pixels, {found} were given")]
-    PixelCount {
-        width: usize,
-        height: usize,
-        /// Width times height.
-        expected: usize,
-        /// The number of pixels given.
-        found: usize,
-    },
+    PixelCount { width: usize, height: usize, expected: usize, found: usize },
 }
 
+impl ImageError {
+    pub(crate) fn invalid(path: &Path, what: impl Into<String>) -> Self {
+        Self::Invalid { path: path.to_owned(), what: what.into() }
+    }
+
+    pub(crate) fn unsupported(path: &Path, what: impl Into<String>) -> Self {
+        Self::Unsupported { path: path.to_owned(), what: what.into() }
+    }
+}
+
+/// What was expected of a file's bytes and what was found, for callers who name the file.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Malformed(pub(crate) String);
+
 /// Most pixels in a row and most rows.
-pub const MAX_SIDE: u64 = 16_384;
+const MAX_SIDE: u64 = 16_384;
 /// Most pixels in a picture: 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 /// Largest file, in bytes.
@@ -50,12 +58,8 @@ pub fn check_size(path: &Path, width: u64, height: u64) -> Result<(), ImageError
     if sound {
         return Ok(());
     }
-    Err(ImageError::Invalid {
-        path: path.to_owned(),
-        what: format!(
-            "a picture of {width}x{height} pixels; expected 1 to {MAX_SIDE} a side and at most {MAX_PIXELS} together"
-        ),
-    })
+    let expected = format!("expected 1 to {MAX_SIDE} a side and at most {MAX_PIXELS} together");
+    Err(ImageError::invalid(path, format!("a picture of {width}x{height} pixels; {expected}")))
 }
 
 /// The file's bytes; fails where there are more than [`MAX_FILE_BYTES`].

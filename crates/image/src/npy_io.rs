@@ -1,8 +1,9 @@
-//! Reads pictures from untrusted NumPy files (`.npy`), as Python programs save the arrays of a network.
+//! Reads untrusted NumPy files (`.npy`): pictures, as Python programs save the arrays of a network, and lists of whole
+//! numbers.
 //!
-//! Shapes: rows, columns (grey); rows, columns, channels; or channels, rows, columns, where the channels are 1, 3 or 4;
-//! leading axes of length 1 are dropped. Types: `u1` and `u2`, which count as the integers of a PNG, and the floats
-//! `f2`, `f4` and `f8`, which count as linear like those of an EXR.
+//! Shapes of pictures: rows, columns (grey); rows, columns, channels; or channels, rows, columns, where the channels are
+//! 1, 3 or 4; leading axes of length 1 are dropped. Types: `u1` and `u2`, which count as the integers of a PNG, and the
+//! floats `f2`, `f4` and `f8`, which count as linear like those of an EXR.
 //!
 //! The header is checked before the library parses it. The library takes memory for the header's stated length,
 //! recurses as deep as its brackets and multiplies the shape's numbers unchecked. The header is therefore compared with
@@ -11,55 +12,42 @@
 
 use std::path::Path;
 
-use crate::limits::check_size;
+use crate::limits::{Malformed, check_size};
 use crate::texture::Encoding;
 use crate::{ImageError, Texels, Texture, Wrap};
 
 /// The first bytes of a NumPy file.
-pub const NPY_SIGNATURE: &[u8] = b"\x93NUMPY";
+pub(crate) const NPY_SIGNATURE: &[u8] = b"\x93NUMPY";
 /// The largest header. NumPy's own are below 200 bytes.
-pub(crate) const MAX_HEADER_BYTES: usize = 4096;
+const MAX_HEADER_BYTES: usize = 4096;
 /// The most bytes before the header: magic string, version and the header's length.
-pub(crate) const MAX_PREFIX_BYTES: usize = 12;
+const MAX_PREFIX_BYTES: usize = 12;
 /// The most digits in a header. The product of any numbers that are written with 16 digits together, times the bytes of
 /// one number, is below 10^17.
 const MAX_HEADER_DIGITS: usize = 16;
 
-/// Why the header of a NumPy file is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NpyHeaderError {
-    /// The bytes end within the prefix or the header.
-    #[error("expected a NumPy array, found {found} bytes, which end within the header")]
-    CutOff { found: usize },
-    /// The header is too long.
-    #[error("its header is {found} bytes long; expected at most {most}")]
-    LongHeader {
-        /// The header's stated length.
-        found: usize,
-        /// The greatest length allowed.
-        most: usize,
-    },
-    /// NumPy does not write such a header for a plain array of numbers.
-    #[error("its header is not one that NumPy writes for a plain array of numbers; pickled objects are never read")]
-    OtherHeader,
+/// The most bytes of a file of `count` numbers of any type.
+pub const fn most_bytes(count: usize) -> u64 {
+    (MAX_PREFIX_BYTES + MAX_HEADER_BYTES + size_of::<u64>() * count) as u64
 }
 
-/// The data behind the header. Fails where the header is not that of a plain array.
-pub fn checked_data(bytes: &[u8]) -> Result<&[u8], NpyHeaderError> {
-    let (header, data) = split(bytes)?;
-    if is_plain(header) { Ok(data) } else { Err(NpyHeaderError::OtherHeader) }
-}
-
-/// The header's text and the data behind it.
-fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyHeaderError> {
-    let cut_off = || NpyHeaderError::CutOff { found: bytes.len() };
+/// The array, and the data behind its header. Fails where the header is not that of a plain array.
+fn open(bytes: &[u8]) -> Result<(npyz::NpyFile<&[u8]>, &[u8]), Malformed> {
+    let cut_off =
+        || Malformed(format!("expected a NumPy array, found {} bytes, which end within the header", bytes.len()));
     let from = if bytes.get(6) == Some(&1) { 10 } else { MAX_PREFIX_BYTES };
     let length = bytes.get(8..from).ok_or_else(cut_off)?;
     let length = length.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte));
     if length > MAX_HEADER_BYTES {
-        return Err(NpyHeaderError::LongHeader { found: length, most: MAX_HEADER_BYTES });
+        return Err(Malformed(format!("its header is {length} bytes long; expected at most {MAX_HEADER_BYTES}")));
     }
-    bytes[from..].split_at_checked(length).ok_or_else(cut_off)
+    let (header, data) = bytes[from..].split_at_checked(length).ok_or_else(cut_off)?;
+    if !is_plain(header) {
+        let what =
+            "its header is not one that NumPy writes for a plain array of numbers; pickled objects are never read";
+        return Err(Malformed(what.to_owned()));
+    }
+    Ok((npyz::NpyFile::new(bytes).map_err(unsound)?, data))
 }
 
 /// Whether the header is one dictionary with one tuple of decimal numbers, without escapes, lists, large numbers and
@@ -78,42 +66,58 @@ fn is_plain(header: &[u8]) -> bool {
         && !is_object
 }
 
-/// Why a NumPy file is not a picture.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum NpyPictureError {
-    /// The library refused the array.
-    #[error("not a valid NumPy array: {0}")]
-    Unsound(std::io::Error),
-    /// The axes do not describe one picture.
-    #[error(
-        "an array of shape ({}); expected (rows, columns), (rows, columns, channels) or (channels, rows, columns) with 1, 3 or 4 channels",
-        joined(.0)
-    )]
-    Shape(Vec<u64>),
-    /// Either of two axes could hold the channels.
-    #[error(
-        "an array of shape ({}), whose first and last axis could both be channels; save the picture as PNG or EXR",
-        joined(.0)
-    )]
-    Ambiguous(Vec<u64>),
-    /// The first axis changes fastest, as in Fortran.
-    #[error("an array in Fortran order; save numpy.ascontiguousarray(array)")]
-    Fortran,
-    /// The type of the numbers is not supported.
-    #[error("an array of {0}; expected u1, u2, f2, f4 or f8; convert it with array.astype('f4')")]
-    Type(String),
-    /// The data has another length than the header states.
-    #[error("expected {expected} bytes of numbers, found {found}")]
-    Length {
-        /// Bytes that the numbers take.
-        expected: u64,
-        /// Bytes behind the header.
-        found: u64,
-    },
+fn unsound(reason: std::io::Error) -> Malformed {
+    Malformed(format!("not a valid NumPy array: {reason}"))
 }
 
 pub(crate) fn joined(shape: &[u64]) -> String {
     shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// Returns the numbers of `$file`, whose `$data` is known to be small enough for memory, as `$make` makes them of the
+/// first of these types that is the file's. Fails where it has none of them, and where the data has another length than
+/// the header states.
+macro_rules! read_numbers {
+    ($file:ident, $data:ident, $expected:literal; $($number:ty => $make:expr),* $(,)?) => {{
+        let (count, described) = ($file.len(), $file.dtype().descr());
+        // The library gives the file back where it does not hold numbers of the requested type.
+        $(let $file = match $file.try_data::<$number>() {
+            Ok(numbers) => {
+                let (expected, found) = (count * size_of::<$number>() as u64, $data.len());
+                if found as u64 != expected {
+                    return Err(Malformed(format!("expected {expected} bytes of numbers, found {found}")));
+                }
+                return numbers.collect::<Result<Vec<$number>, _>>().map($make).map_err(unsound);
+            }
+            Err(file) => file,
+        };)*
+        drop($file);
+        Err(Malformed(format!(concat!("an array of {}; ", $expected), described)))
+    }};
+}
+
+/// The numbers of an array with at most one axis whose length is not 1: (N,), (N, 1) or (1, N). Numbers of 2^63 or more
+/// wrap around to negative ones.
+pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, Malformed> {
+    fn widened<T>(wide: fn(T) -> i64) -> impl Fn(Vec<T>) -> Vec<i64> {
+        move |numbers| numbers.into_iter().map(wide).collect()
+    }
+    let (file, data) = open(bytes)?;
+    // With two long axes, the order of the numbers would be ambiguous.
+    if !matches!(file.shape(), [_] | [_, 1] | [1, _]) {
+        let shape = joined(file.shape());
+        return Err(Malformed(format!("an array of shape ({shape}); expected (N,), (N, 1) or (1, N)")));
+    }
+    read_numbers!(file, data, "expected integers, as in '<i8'";
+        i64 => |numbers| numbers,
+        i32 => widened(i64::from),
+        i16 => widened(i64::from),
+        i8 => widened(i64::from),
+        u64 => widened(|number| number as i64),
+        u32 => widened(i64::from),
+        u16 => widened(i64::from),
+        u8 => widened(i64::from),
+    )
 }
 
 /// Rows, columns and channels of an array, and which axis holds the channels.
@@ -127,18 +131,22 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(shape: &[u64]) -> Result<Self, NpyPictureError> {
+    fn of(shape: &[u64]) -> Result<Self, Malformed> {
+        let refused = |what: &str| Err(Malformed(format!("an array of shape ({}){what}", joined(shape))));
+        const EXPECTED: &str = "; expected (rows, columns), (rows, columns, channels) or (channels, rows, columns) with 1, 3 or 4 channels";
         let lead = shape.iter().take(shape.len().saturating_sub(3)).take_while(|axis| **axis == 1).count();
         let is_channels = |axis: u64| matches!(axis, 1 | 3 | 4);
         match shape[lead..] {
             [rows, columns] => Ok(Self { rows, columns, channels: 1, is_planar: false }),
             [first, middle, last] => match (is_channels(first), is_channels(last)) {
-                (true, true) => Err(NpyPictureError::Ambiguous(shape.to_vec())),
+                (true, true) => {
+                    refused(", whose first and last axis could both be channels; save the picture as PNG or EXR")
+                }
                 (false, true) => Ok(Self { rows: first, columns: middle, channels: last, is_planar: false }),
                 (true, false) => Ok(Self { rows: middle, columns: last, channels: first, is_planar: true }),
-                (false, false) => Err(NpyPictureError::Shape(shape.to_vec())),
+                (false, false) => refused(EXPECTED),
             },
-            _ => Err(NpyPictureError::Shape(shape.to_vec())),
+            _ => refused(EXPECTED),
         }
     }
 
@@ -162,12 +170,12 @@ enum Numbers {
 
 /// Reads a picture from the bytes of a NumPy file; `path` serves for errors only. Every value must be finite.
 pub(crate) fn texture_of_npy(path: &Path, bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
-    let invalid = |what: String| ImageError::Invalid { path: path.to_owned(), what };
-    let data = checked_data(bytes).map_err(|error| invalid(error.to_string()))?;
-    let file = npyz::NpyFile::new(bytes).map_err(|error| invalid(NpyPictureError::Unsound(error).to_string()))?;
-    let layout = Layout::of(file.shape()).map_err(|error| invalid(error.to_string()))?;
+    let invalid = |what: String| ImageError::invalid(path, what);
+    let unsound = |Malformed(what)| invalid(what);
+    let (file, data) = open(bytes).map_err(unsound)?;
+    let layout = Layout::of(file.shape()).map_err(unsound)?;
     check_size(path, layout.columns, layout.rows)?;
-    let numbers = numbers(file, layout, data.len() as u64).map_err(|error| invalid(error.to_string()))?;
+    let numbers = numbers(file, data).map_err(unsound)?;
     if let Numbers::Floats(values) = &numbers
         && let Some(at) = values.iter().position(|value| !value.is_finite())
     {
@@ -186,40 +194,17 @@ pub(crate) fn texture_of_npy(path: &Path, bytes: &[u8], encoding: Encoding, wrap
     Texture::new(layout.columns as usize, layout.rows as usize, texels, wrap)
 }
 
-/// The numbers. Fails where the `found` bytes of data have another length than the header states. `layout` is within
-/// the limits of pictures, so no product overflows.
-fn numbers(file: npyz::NpyFile<&[u8]>, layout: Layout, found: u64) -> Result<Numbers, NpyPictureError> {
+fn numbers(file: npyz::NpyFile<&[u8]>, data: &[u8]) -> Result<Numbers, Malformed> {
     if file.order() != npyz::Order::C {
-        return Err(NpyPictureError::Fortran);
+        return Err(Malformed("an array in Fortran order; save numpy.ascontiguousarray(array)".to_owned()));
     }
-    let count = layout.rows * layout.columns * layout.channels;
-    let described = file.dtype().descr();
-    // The library gives the file back where it does not hold numbers of the requested type.
-    macro_rules! try_types {
-        ($file:expr; $($number:ty => $make:expr),*) => {{
-            let file = $file;
-            $(let file = match file.try_data::<$number>() {
-                Ok(numbers) => {
-                    let expected = count * size_of::<$number>() as u64;
-                    if found != expected {
-                        return Err(NpyPictureError::Length { expected, found });
-                    }
-                    let numbers: Result<Vec<$number>, _> = numbers.collect();
-                    return numbers.map($make).map_err(NpyPictureError::Unsound);
-                }
-                Err(file) => file,
-            };)*
-            drop(file);
-        }};
-    }
-    try_types!(file;
+    read_numbers!(file, data, "expected u1, u2, f2, f4 or f8; convert it with array.astype('f4')";
         u8 => Numbers::Bytes,
         u16 => Numbers::Words,
         f32 => Numbers::Floats,
-        f64 => |values: Vec<f64>| Numbers::Floats(values.into_iter().map(|value| value as f32).collect()),
-        npyz::half::f16 => |values: Vec<npyz::half::f16>| Numbers::Floats(values.into_iter().map(f32::from).collect())
-    );
-    Err(NpyPictureError::Type(described))
+        f64 => |values| Numbers::Floats(values.into_iter().map(|value| value as f32).collect()),
+        npyz::half::f16 => |values| Numbers::Floats(values.into_iter().map(f32::from).collect()),
+    )
 }
 
 #[cfg(test)]
@@ -237,6 +222,11 @@ mod tests {
         writer.extend(numbers.iter().copied()).unwrap();
         writer.finish().unwrap();
         bytes
+    }
+
+    fn with_header(header: &str, data: &[u8]) -> Vec<u8> {
+        let length = (header.len() as u16).to_le_bytes();
+        [b"\x93NUMPY\x01\x00".as_slice(), &length, header.as_bytes(), data].concat()
     }
 
     fn read(bytes: &[u8]) -> Result<Texture, ImageError> {
@@ -295,13 +285,7 @@ mod tests {
     /// A header that claims a petabyte takes no memory; pickled objects are refused.
     #[test]
     fn claims_are_checked_before_memory_is_taken() {
-        let with_header = |header: &str| {
-            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-            bytes.extend(&(header.len() as u16).to_le_bytes());
-            bytes.extend(header.as_bytes());
-            bytes.extend([0; 16]);
-            bytes
-        };
+        let with_header = |header: &str| with_header(header, &[0; 16]);
         let claim = |shape: &str| {
             refused(&with_header(&format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}")))
         };
@@ -314,6 +298,80 @@ mod tests {
         assert!(refused(&pickled).contains("pickled objects are never read"));
     }
 
+    #[test]
+    fn whole_numbers_of_any_width_come_back() {
+        use npyz::Order::C;
+        assert_eq!(whole_numbers(&npy(&[7_i64, -1, i64::MIN], &[3], C)).unwrap(), [7, -1, i64::MIN]);
+        assert_eq!(whole_numbers(&npy(&[7_i32, -1, i32::MIN], &[3, 1], C)).unwrap(), [7, -1, i64::from(i32::MIN)]);
+        assert_eq!(whole_numbers(&npy(&[7_i16, -1], &[1, 2], C)).unwrap(), [7, -1]);
+        assert_eq!(whole_numbers(&npy(&[7_i8, -1], &[2], C)).unwrap(), [7, -1]);
+        assert_eq!(whole_numbers(&npy(&[9_u8, 200], &[2], C)).unwrap(), [9, 200]);
+        assert_eq!(whole_numbers(&npy(&[9_u16, 60_000], &[2], C)).unwrap(), [9, 60_000]);
+        assert_eq!(whole_numbers(&npy(&[u64::MAX, 0], &[2], C)).unwrap(), [-1, 0]);
+        assert!(whole_numbers(&npy::<i64>(&[], &[0], C)).unwrap().is_empty());
+        let big = with_header("{'shape': (2,), 'fortran_order': False, 'descr': '>i2'}\n", &[0, 1, 0xff, 0xfe]);
+        assert_eq!(whole_numbers(&big).unwrap(), [1, -2]);
+    }
+
+    /// In Fortran's order the numbers of two axes are stored differently; those of one axis are not.
+    #[test]
+    fn two_axes_are_refused_in_either_order() {
+        for order in [npyz::Order::C, npyz::Order::Fortran] {
+            let fault = whole_numbers(&npy(&[1_i64; 6], &[2, 3], order)).unwrap_err();
+            assert_eq!(fault.to_string(), "an array of shape (2, 3); expected (N,), (N, 1) or (1, N)");
+            assert_eq!(whole_numbers(&npy(&[5_i64, 6], &[2, 1], order)).unwrap(), [5, 6]);
+        }
+        for shape in [&[1, 1, 4][..], &[]] {
+            whole_numbers(&npy(&[1_i64; 4][..shape.iter().product::<u64>() as usize], shape, npyz::Order::C))
+                .unwrap_err();
+        }
+    }
+
+    #[test]
+    fn data_of_another_length_is_refused() {
+        let mut bytes = npy(&[1_i64, 2], &[2], npyz::Order::C);
+        let fault = |bytes: &[u8]| whole_numbers(bytes).unwrap_err().to_string();
+        assert_eq!(fault(&bytes[..bytes.len() - 1]), "expected 16 bytes of numbers, found 15");
+        bytes.push(0);
+        assert_eq!(fault(&bytes), "expected 16 bytes of numbers, found 17");
+    }
+
+    #[test]
+    fn other_headers_are_refused() {
+        let plain = "{'descr': '<i8', 'fortran_order': False, 'shape': (1,), }";
+        assert_eq!(whole_numbers(&with_header(plain, &[5, 0, 0, 0, 0, 0, 0, 0])).unwrap(), [5]);
+        for (from, to) in [
+            // The product exceeds 64 bits, which once caused a panic or a small number.
+            ("(1,)", "(0xffffffffffffffff, 0xffff)"),
+            ("(1,)", "(0b1,)"),
+            ("(1,)", "(1_0,)"),
+            ("(1,)", "(-1,)"),
+            ("(1,)", "(1)"),
+            ("(1,)", "(1 1,)"),
+            ("(1,)", "(,)"),
+            ("(1,)", "(18446744073709551616,)"),
+            ("(1,)", "(18446744073709551615,)"),
+            ("(1,)", "(4294967296, 4294967296)"),
+            ("False", "0"),
+            ("'<i8'", "[('a', '<i8')]"),
+            ("'<i8'", "'<f8'"),
+            ("'<i8'", "'<i16'"),
+            ("'<i8'", "'\\x3ci8'"),
+            ("'fortran_order': False, ", ""),
+            ("'fortran_order'", "'descr'"),
+            ("}", "} {}"),
+            ("{", "{{"),
+        ] {
+            let changed = plain.replace(from, to);
+            assert_ne!(changed, plain);
+            whole_numbers(&with_header(&changed, &[5, 0, 0, 0, 0, 0, 0, 0])).unwrap_err();
+        }
+        whole_numbers(&with_header(&"[".repeat(4000), &[])).unwrap_err();
+        let mut long = b"\x93NUMPY\x02\x00".to_vec();
+        long.extend(&u32::MAX.to_le_bytes());
+        assert!(whole_numbers(&long).unwrap_err().to_string().contains("header is 4294967295 bytes long"));
+    }
+
     proptest! {
         #[test]
         fn no_bytes_cause_a_panic(mut bytes in prop::collection::vec(any::<u8>(), 0..300), whole in any::<bool>()) {
@@ -322,7 +380,7 @@ mod tests {
                 let noise = bytes.iter().chain(std::iter::repeat(&0));
                 bytes = sound.iter().zip(noise).map(|(a, b)| a ^ (b & b >> 4)).collect();
             }
-            let _ = read(&bytes);
+            let _ = (read(&bytes), whole_numbers(&bytes));
         }
     }
 }

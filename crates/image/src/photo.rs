@@ -22,11 +22,11 @@ impl PhotoFile {
     /// Reads a photo from a file's bytes. `path` serves for errors only. Fails where a value is negative, NaN or
     /// infinite, and where the file asks to be turned or mirrored for display: its camera is that of the stored pixels.
     pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, ImageError> {
-        let invalid = |what: String| ImageError::Invalid { path: path.to_owned(), what };
+        let invalid = |what: String| ImageError::invalid(path, what);
         if bytes.starts_with(NPY_SIGNATURE) {
             let what =
                 "a NumPy array does not state whether it is sRGB or linear; expected PNG, JPEG, WebP, BMP, Radiance HDR or OpenEXR".to_owned();
-            return Err(ImageError::Unsupported { path: path.to_owned(), what });
+            return Err(ImageError::unsupported(path, what));
         }
         if is_turned(&bytes) {
             let what = "its EXIF data asks to turn or mirror it for display; expected a photo that is stored upright";

@@ -82,7 +82,6 @@ impl<T: Copy> Picture<T> {
         &mut self.pixels
     }
 
-    /// The pixels, without width and height.
     pub fn into_pixels(self) -> Vec<T> {
         self.pixels
     }
@@ -118,7 +117,6 @@ impl Picture<LinearRgb> {
 }
 
 impl Picture<SrgbRgb> {
-    /// The picture decoded to linear light.
     pub fn to_linear(&self) -> Picture<LinearRgb> {
         self.map(|SrgbRgb(rgb)| LinearRgb(rgb.map(crate::transfer::linear_from_srgb)))
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
-use crate::limits::{check_size, read_file};
+use crate::limits::{Malformed, check_size, read_file};
 use crate::transfer::byte_from_unit;
 use crate::{ImageError, Mask, Picture, SrgbRgb};
 use mateval_files::whole::write_whole;
@@ -22,37 +22,34 @@ pub fn write_srgb(path: &Path, picture: &Picture<SrgbRgb>) -> Result<(), ImageEr
 
 /// Writes 8-bit RGB from bytes.
 pub fn write_rgb_bytes(path: &Path, picture: &Picture<[u8; 3]>) -> Result<(), ImageError> {
-    let data = picture.pixels().as_flattened();
-    write(path, picture.width(), picture.height(), png::ColorType::Rgb, png::BitDepth::Eight, data)
+    write(path, picture, (png::ColorType::Rgb, png::BitDepth::Eight), picture.pixels().as_flattened())
 }
 
 /// Writes 8-bit RGB with opacity from bytes.
 pub fn write_rgba_bytes(path: &Path, picture: &Picture<[u8; 4]>) -> Result<(), ImageError> {
-    let data = picture.pixels().as_flattened();
-    write(path, picture.width(), picture.height(), png::ColorType::Rgba, png::BitDepth::Eight, data)
+    write(path, picture, (png::ColorType::Rgba, png::BitDepth::Eight), picture.pixels().as_flattened())
 }
 
 /// Writes 8-bit grey with opacity from bytes.
 pub fn write_grey_alpha_bytes(path: &Path, picture: &Picture<[u8; 2]>) -> Result<(), ImageError> {
-    let data = picture.pixels().as_flattened();
-    write(path, picture.width(), picture.height(), png::ColorType::GrayscaleAlpha, png::BitDepth::Eight, data)
+    write(path, picture, (png::ColorType::GrayscaleAlpha, png::BitDepth::Eight), picture.pixels().as_flattened())
 }
 
 /// Writes 16-bit RGB from words.
 pub fn write_rgb_words(path: &Path, picture: &Picture<[u16; 3]>) -> Result<(), ImageError> {
     let data: Vec<u8> = picture.pixels().as_flattened().iter().flat_map(|word| word.to_be_bytes()).collect();
-    write(path, picture.width(), picture.height(), png::ColorType::Rgb, png::BitDepth::Sixteen, &data)
+    write(path, picture, (png::ColorType::Rgb, png::BitDepth::Sixteen), &data)
 }
 
 /// Writes 8-bit grey from bytes.
 pub fn write_grey_bytes(path: &Path, picture: &Picture<u8>) -> Result<(), ImageError> {
-    write(path, picture.width(), picture.height(), png::ColorType::Grayscale, png::BitDepth::Eight, picture.pixels())
+    write(path, picture, (png::ColorType::Grayscale, png::BitDepth::Eight), picture.pixels())
 }
 
 /// Writes 16-bit grey from integers: ids, or values times 65535.
 pub fn write_ids(path: &Path, picture: &Picture<u16>) -> Result<(), ImageError> {
     let data: Vec<u8> = picture.pixels().iter().flat_map(|id| id.to_be_bytes()).collect();
-    write(path, picture.width(), picture.height(), png::ColorType::Grayscale, png::BitDepth::Sixteen, &data)
+    write(path, picture, (png::ColorType::Grayscale, png::BitDepth::Sixteen), &data)
 }
 
 /// Writes 8-bit grey: 255 where the mask is true, else 0.
@@ -97,33 +94,29 @@ pub fn read_mask(path: &Path) -> Result<Mask, ImageError> {
     if let Some(at) = raw.data.iter().position(|byte| !matches!(byte, 0 | 255)) {
         let (x, y) = (at % raw.width, at / raw.width);
         let what = format!("pixel ({x}, {y}) of a mask is {}; expected 0 or 255", raw.data[at]);
-        return Err(ImageError::Invalid { path: path.to_owned(), what });
+        return Err(ImageError::invalid(path, what));
     }
     Picture::new(raw.width, raw.height, raw.data.iter().map(|byte| *byte == 255).collect())
 }
 
-fn write(
+fn write<T: Copy>(
     path: &Path,
-    width: usize,
-    height: usize,
-    color: png::ColorType,
-    depth: png::BitDepth,
+    picture: &Picture<T>,
+    (color, depth): (png::ColorType, png::BitDepth),
     data: &[u8],
 ) -> Result<(), ImageError> {
     let side = |pixels: usize| {
-        u32::try_from(pixels).map_err(|_| ImageError::Unsupported {
-            path: path.to_owned(),
-            what: format!("a side of {pixels} pixels; PNG holds at most {}", u32::MAX),
-        })
+        let refused = || format!("a side of {pixels} pixels; PNG holds at most {}", u32::MAX);
+        u32::try_from(pixels).map_err(|_| ImageError::unsupported(path, refused()))
     };
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, side(width)?, side(height)?);
+    let mut encoder = png::Encoder::new(&mut bytes, side(picture.width())?, side(picture.height())?);
     encoder.set_color(color);
     encoder.set_depth(depth);
     encoder
         .write_header()
         .and_then(|mut writer| writer.write_image_data(data))
-        .map_err(|error| ImageError::Unsupported { path: path.to_owned(), what: error.to_string() })?;
+        .map_err(|error| ImageError::unsupported(path, error.to_string()))?;
     Ok(write_whole(path, &bytes)?)
 }
 
@@ -137,14 +130,13 @@ pub(crate) struct Raw {
 }
 
 impl Raw {
-    /// The 16-bit samples.
     pub(crate) fn words(&self) -> Vec<u16> {
         self.data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
     }
 
     fn unexpected(&self, path: &Path, expected: &str) -> ImageError {
         let what = format!("expected {expected}, found {}-bit {:?}", self.depth as u8, self.color);
-        ImageError::Invalid { path: path.to_owned(), what }
+        ImageError::invalid(path, what)
     }
 }
 
@@ -154,10 +146,7 @@ fn decode(path: &Path) -> Result<Raw, ImageError> {
 
 /// Decodes a file's bytes. Text and profiles are skipped, since they may unpack to a thousand times their size.
 pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageError> {
-    let invalid = |error: png::DecodingError| ImageError::Invalid {
-        path: path.to_owned(),
-        what: format!("not a valid PNG: {error}"),
-    };
+    let invalid = |error: png::DecodingError| ImageError::invalid(path, format!("not a valid PNG: {error}"));
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
     decoder.set_limits(png::Limits { bytes: 1 << 28 });
@@ -166,10 +155,9 @@ pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageErro
     let header = decoder.read_header_info().map_err(invalid)?;
     check_size(path, u64::from(header.width), u64::from(header.height))?;
     let mut reader = decoder.read_info().map_err(invalid)?;
-    let size = reader.output_buffer_size().ok_or_else(|| ImageError::Unsupported {
-        path: path.to_owned(),
-        what: "more bytes than this machine can address".to_owned(),
-    })?;
+    let size = reader
+        .output_buffer_size()
+        .ok_or_else(|| ImageError::unsupported(path, "more bytes than this machine can address".to_owned()))?;
     let mut data = vec![0; size];
     let info = reader.next_frame(&mut data).map_err(invalid)?;
     data.truncate(info.buffer_size());
@@ -182,10 +170,7 @@ pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageErro
     })
 }
 
-/// Most pixels in a row and most rows.
-pub const MAX_JPEG_SIDE: usize = u16::MAX as usize;
-
-/// The picture as a JPEG file of a quality of 1 to 100; none if it has no pixels or more than [`MAX_JPEG_SIDE`] a side.
+/// The picture as a JPEG file of a quality of 1 to 100; none if it has no pixels or more than 65535 a side.
 pub fn jpeg_bytes(picture: &Picture<[u8; 3]>, quality: u8) -> Option<Vec<u8>> {
     let [width, height] = [picture.width(), picture.height()].map(|side| u16::try_from(side).ok().filter(|s| *s > 0));
     let mut bytes = Vec::new();
@@ -198,7 +183,6 @@ pub fn jpeg_bytes(picture: &Picture<[u8; 3]>, quality: u8) -> Option<Vec<u8>> {
 /// The first bytes of a PNG.
 pub const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// The header's colour type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PngColor {
     Grey,
@@ -223,23 +207,6 @@ impl PngColor {
     }
 }
 
-/// Why the header of a PNG cannot be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PngHeaderError {
-    /// The first bytes are not [`PNG_SIGNATURE`].
-    #[error("it does not begin with the signature of a PNG")]
-    NoSignature,
-    /// The first chunk is another one, or cut.
-    #[error("its first chunk is not a whole header (IHDR)")]
-    NoHeader,
-    /// The header is too short or too long.
-    #[error("its header has {found} bytes; expected 13")]
-    HeaderLength { found: usize },
-    /// A colour type that PNG does not have.
-    #[error("its colour type is {found}; expected 0, 2, 3, 4 or 6")]
-    ColorType { found: u8 },
-}
-
 /// The header of a PNG, and the names of its chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PngHeader {
@@ -250,7 +217,6 @@ pub struct PngHeader {
     pub color: PngColor,
     /// Whether rows are interlaced (Adam7).
     pub interlaced: bool,
-    /// The names of all chunks.
     pub chunks: BTreeSet<[u8; 4]>,
     /// Whether the closing chunk (IEND) exists.
     pub ended: bool,
@@ -260,13 +226,13 @@ pub struct PngHeader {
 
 impl PngHeader {
     /// Reads the header and walks over the other chunks. Fails where the first chunk is not a valid header.
-    pub fn of(bytes: &[u8]) -> Result<Self, PngHeaderError> {
+    pub fn of(bytes: &[u8]) -> Result<Self, Malformed> {
         let Some(rest) = bytes.strip_prefix(PNG_SIGNATURE) else {
-            return Err(PngHeaderError::NoSignature);
+            return Err(Malformed("it does not begin with the signature of a PNG".to_owned()));
         };
         let mut chunks = Chunks { rest };
         let Some((b"IHDR", data)) = chunks.next() else {
-            return Err(PngHeaderError::NoHeader);
+            return Err(Malformed("its first chunk is not a whole header (IHDR)".to_owned()));
         };
         let mut header = Self::of_data(data)?;
         for (name, _) in chunks.by_ref() {
@@ -280,11 +246,11 @@ impl PngHeader {
         Ok(header)
     }
 
-    fn of_data(data: &[u8]) -> Result<Self, PngHeaderError> {
+    fn of_data(data: &[u8]) -> Result<Self, Malformed> {
         let (size, &[bit_depth, color, _, _, interlace]) = data
             .split_first_chunk::<8>()
             .and_then(|(size, rest)| Some((size, <&[u8; 5]>::try_from(rest).ok()?)))
-            .ok_or(PngHeaderError::HeaderLength { found: data.len() })?;
+            .ok_or_else(|| Malformed(format!("its header has {} bytes; expected 13", data.len())))?;
         let side = |at: usize| u32::from_be_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
         let color = match color {
             0 => PngColor::Grey,
@@ -292,7 +258,7 @@ impl PngHeader {
             3 => PngColor::Palette,
             4 => PngColor::GreyAlpha,
             6 => PngColor::Rgba,
-            found => return Err(PngHeaderError::ColorType { found }),
+            found => return Err(Malformed(format!("its colour type is {found}; expected 0, 2, 3, 4 or 6"))),
         };
         Ok(Self {
             width: side(0),

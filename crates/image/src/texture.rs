@@ -6,6 +6,9 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_word};
 
 /// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
@@ -13,7 +16,6 @@ use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_word};
 pub enum Encoding {
     /// With the sRGB curve.
     Srgb,
-    /// Linearly.
     Linear,
 }
 
@@ -28,14 +30,12 @@ pub enum Texels {
     Linear8(Vec<[u8; 3]>),
     /// Linear scalars as bytes, value = byte / 255; all three channels the same.
     Grey8(Vec<u8>),
-    /// Linear floats.
     Linear(Vec<[f32; 3]>),
     /// Linear float scalars; all three channels the same.
     Grey(Vec<f32>),
 }
 
 impl Texels {
-    /// The texels as bytes in memory.
     fn bytes(&self) -> &[u8] {
         match self {
             Self::Srgb8(v) | Self::Linear8(v) => v.as_flattened(),
@@ -94,7 +94,6 @@ impl Texture {
         Arc::unwrap_or_clone(self.texels)
     }
 
-    /// How lookups continue outside 0..1.
     pub fn wrap(&self) -> Wrap {
         self.wrap
     }
@@ -129,6 +128,11 @@ impl Texture {
             Texels::Linear(v) => v[at],
             Texels::Grey(v) => [v[at]; 3],
         }
+    }
+
+    /// The linear values of all texels, row by row from the top left.
+    pub fn linear_texels(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
+        (0..self.height).flat_map(move |y| (0..self.width).map(move |x| self.texel(x, y)))
     }
 
     /// The linear value at `uv`, bilinear. A coordinate that is not finite or beyond 1e9 reads as 0.
@@ -178,22 +182,23 @@ impl Texture {
         })
     }
 
-    /// The grid of its texels.
     #[inline(always)]
     pub fn grid(&self) -> TexelGrid {
         TexelGrid { width: self.width, height: self.height, wrap: self.wrap }
     }
 }
 
-/// How lookups continue outside 0..1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How a texture continues outside 0..1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "WrapWord")]
 pub enum Wrap {
-    /// The picture is repeated.
+    /// The picture again.
     #[default]
     Repeat,
-    /// The nearest border texel is used.
+    /// The border texel.
     Clamp,
-    /// The picture is repeated, mirrored every other time.
+    /// Mirrored every other time.
     Mirror,
 }
 
@@ -204,7 +209,6 @@ pub struct TexelGrid {
     pub width: usize,
     /// Rows, at least 1.
     pub height: usize,
-    /// How lookups continue outside 0..1.
     pub wrap: Wrap,
 }
 

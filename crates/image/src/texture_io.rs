@@ -67,16 +67,13 @@ fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Textu
 }
 
 fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
-    let invalid = |error: image::ImageError| ImageError::Invalid {
-        path: path.to_owned(),
-        what: format!("not a valid picture: {error}"),
-    };
+    let invalid = |error: image::ImageError| ImageError::invalid(path, format!("not a valid picture: {error}"));
     let hint = hint(&bytes);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(FileError::io("read", path))?;
     if reader.format().is_none() {
         let what =
             format!("not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy{hint}");
-        return Err(ImageError::Unsupported { path: path.to_owned(), what });
+        return Err(ImageError::unsupported(path, what));
     }
     let decoder = reader.into_decoder().map_err(invalid)?;
     let (width, height) = decoder.dimensions();
@@ -112,7 +109,7 @@ fn color_texels(path: &Path, decoded: DynamicImage, encoding: Encoding) -> Resul
         && !values.iter().flatten().all(|v| v.is_finite())
     {
         let what = "a texel is NaN or infinite; expected finite numbers".to_owned();
-        return Err(ImageError::Invalid { path: path.to_owned(), what });
+        return Err(ImageError::invalid(path, what));
     }
     Ok(texels)
 }
@@ -274,32 +271,21 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let byte = |x: usize, y: usize, c: usize| (x * 31 + y * 57 + c * 91) as u8;
-        let writers: [&dyn Fn(); 6] = [
-            &|| {
-                png_io::write_rgb_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| byte(x, y, c))))
-                    .unwrap()
-            },
-            &|| {
-                png_io::write_rgba_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1, 2, 3].map(|c| byte(x, y, c))))
-                    .unwrap();
-            },
-            &|| png_io::write_grey_bytes(&path, &Picture::from_fn(5, 3, |x, y| byte(x, y, 0))).unwrap(),
-            &|| {
-                png_io::write_grey_alpha_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1].map(|c| byte(x, y, c))))
-                    .unwrap();
-            },
-            &|| {
-                png_io::write_ids(&path, &Picture::from_fn(5, 3, |x, y| 999_u16.wrapping_mul(byte(x, y, 0).into())))
-                    .unwrap()
-            },
-            &|| {
-                let words =
-                    Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| 999_u16.wrapping_mul(byte(x, y, c).into())));
-                png_io::write_rgb_words(&path, &words).unwrap();
-            },
+        let word = |x: usize, y: usize, c: usize| 999_u16.wrapping_mul(byte(x, y, c).into());
+        let rgb = Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| byte(x, y, c)));
+        let rgba = Picture::from_fn(5, 3, |x, y| [0, 1, 2, 3].map(|c| byte(x, y, c)));
+        let grey_alpha = rgb.map(|[grey, alpha, _]| [grey, alpha]);
+        let words = Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| word(x, y, c)));
+        let writers: [&dyn Fn() -> Result<(), ImageError>; 6] = [
+            &|| png_io::write_rgb_bytes(&path, &rgb),
+            &|| png_io::write_rgba_bytes(&path, &rgba),
+            &|| png_io::write_grey_bytes(&path, &rgb.map(|[grey, ..]| grey)),
+            &|| png_io::write_grey_alpha_bytes(&path, &grey_alpha),
+            &|| png_io::write_ids(&path, &words.map(|[id, ..]| id)),
+            &|| png_io::write_rgb_words(&path, &words),
         ];
         for (at, write) in writers.into_iter().enumerate() {
-            write();
+            write().unwrap();
             let bytes = std::fs::read(&path).unwrap();
             let [srgb, linear] =
                 [Encoding::Srgb, Encoding::Linear].map(|encoding| read_texture(&path, encoding, Wrap::Clamp).unwrap());

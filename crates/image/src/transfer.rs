@@ -24,7 +24,7 @@ static LINEAR_FROM_WORD: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|word| linear_from_srgb(f32::from(word) / 65535.0)).collect());
 
 /// Linear value of an sRGB-encoded 16-bit word, from a table.
-pub fn linear_from_srgb_word(word: u16) -> f32 {
+pub(crate) fn linear_from_srgb_word(word: u16) -> f32 {
     LINEAR_FROM_WORD[usize::from(word)]
 }
 

@@ -14,7 +14,8 @@ use mateval_dataset::reference::Surface;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use crate::source_scene::{InstanceOrigin, Log};
+use crate::log::Log;
+use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::{connected_parts, find};
 
 /// Sheets of architecture no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
@@ -68,12 +69,7 @@ pub(crate) fn separate(surfaces: &mut [Surface], origins: &mut [InstanceOrigin],
 
 /// Moves the sheets of architecture. Returns the layer of each face; none where there are too many pairs.
 fn layered(faces: &[Face], place: &str, log: &mut Log, shifts: &mut Shifts) -> Option<Vec<usize>> {
-    let mut pairs = Vec::new();
-    let is_whole = for_each_near(faces, faces, COINCIDENT_M, |one, other| {
-        if one < other {
-            pairs.push([one, other]);
-        }
-    });
+    let (pairs, is_whole) = near_pairs(faces, COINCIDENT_M);
     if !is_whole {
         return None;
     }
@@ -127,12 +123,7 @@ fn raise(
     // Whole sheets move, one above the other where they overlap each other too.
     let touching = furniture.into_iter().enumerate().filter(|(number, _)| wanted.contains_key(number));
     let touching: Vec<Face> = touching.map(|(_, face)| face).collect();
-    let mut pairs = Vec::new();
-    let is_whole = for_each_near(&touching, &touching, TOUCHES_M, |one, other| {
-        if one < other {
-            pairs.push([one, other]);
-        }
-    });
+    let (pairs, is_whole) = near_pairs(&touching, TOUCHES_M);
     let sheets = Sheets::new(&touching, &pairs);
     let mut shift_of_sheet = vec![DVec3::ZERO; sheets.all.len()];
     for (shift, &sheet) in wanted.values().zip(&sheets.of_face) {
@@ -204,15 +195,10 @@ fn shift(mesh: &mut TriangleMesh, shift_of: &BTreeMap<usize, DVec3>) {
             let vertex = mesh.triangles[triangle][corner];
             let key = (vertex, shift.to_array().map(f64::to_bits));
             mesh.triangles[triangle][corner] = *copies.entry(key).or_insert_with(|| {
-                let place = vertex as usize;
-                mesh.positions.push((mesh.positions[place].as_dvec3() + shift).as_vec3());
-                if let Some(normals) = &mut mesh.normals {
-                    normals.push(normals[place]);
-                }
-                if let Some(uvs) = &mut mesh.uvs {
-                    uvs.push(uvs[place]);
-                }
-                (mesh.positions.len() - 1) as u32
+                let copy = mesh.copy_vertex(vertex);
+                let position = &mut mesh.positions[copy as usize];
+                *position = (position.as_dvec3() + shift).as_vec3();
+                copy
             });
         }
     }
@@ -226,7 +212,6 @@ const SMALLEST_AREA: f64 = 1e-8;
 /// The most pairs of triangles that are compared. A real house has less than a hundredth as many.
 const MOST_PAIRS: usize = 50_000_000;
 
-/// A triangle in world space.
 struct Face {
     surface: usize,
     /// Index in the surface's mesh.
@@ -294,6 +279,17 @@ fn for_each_near(all: &[Face], among: &[Face], distance: f64, mut found: impl Fn
     true
 }
 
+/// The pairs of faces that lie within `distance` of each other, and whether these are all.
+fn near_pairs(faces: &[Face], distance: f64) -> (Vec<[usize; 2]>, bool) {
+    let mut pairs = Vec::new();
+    let is_whole = for_each_near(faces, faces, distance, |one, other| {
+        if one < other {
+            pairs.push([one, other]);
+        }
+    });
+    (pairs, is_whole)
+}
+
 /// Whether two triangles in one plane overlap by more than [`TOUCHING_M`], by the separating axis theorem: no line
 /// along an edge of either separates them.
 fn overlap(one: &Face, other: &Face) -> bool {
@@ -308,9 +304,6 @@ fn overlap(one: &Face, other: &Face) -> bool {
     };
     ![one, other].iter().any(|face| (0..3).any(|k| separates(face.corners[(k + 1) % 3] - face.corners[k])))
 }
-
-/// Numbers the faces, given the sheet of each: faces of a sheet with different numbers become different sheets.
-type Split = fn(&[Face], &[usize]) -> Vec<usize>;
 
 /// The triangles of one part of a mesh that lie in one plane and face one way, without overlaps.
 struct Sheet {
@@ -332,13 +325,13 @@ impl Sheets {
     /// overlap, each of its connected pieces is a sheet, and where that is not enough, each of the piece's triangles.
     fn new(faces: &[Face], pairs: &[[usize; 2]]) -> Self {
         let mut of_face = numbered(faces.iter().map(plane_key));
-        for finer in [connected_pieces as Split, triangles_apart] {
+        for is_last in [false, true] {
             let folded: BTreeSet<usize> =
                 pairs.iter().filter(|[a, b]| of_face[*a] == of_face[*b]).map(|[a, _]| of_face[*a]).collect();
             if folded.is_empty() {
                 break;
             }
-            let piece = finer(faces, &of_face);
+            let piece = if is_last { (0..faces.len()).collect() } else { connected_pieces(faces, &of_face) };
             let keys =
                 of_face.iter().zip(&piece).map(|(sheet, piece)| (*sheet, folded.contains(sheet).then_some(*piece)));
             of_face = numbered(keys);
@@ -404,11 +397,6 @@ fn connected_pieces(faces: &[Face], of_face: &[usize]) -> Vec<usize> {
         }
     }
     (0..faces.len()).map(|face| find(&mut pieces, face)).collect()
-}
-
-/// A number of its own for each face.
-fn triangles_apart(faces: &[Face], _of_face: &[usize]) -> Vec<usize> {
-    (0..faces.len()).collect()
 }
 
 #[cfg(test)]

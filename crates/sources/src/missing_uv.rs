@@ -14,7 +14,8 @@ use mateval_dataset::reference::{
 use mateval_files::untrusted::shortened;
 use mateval_image::{Texels, Texture};
 
-use crate::source_scene::{InstanceOrigin, Log};
+use crate::log::Log;
+use crate::source_scene::InstanceOrigin;
 
 /// The triangles that have no texture coordinates.
 fn triangles_without(mesh: &TriangleMesh) -> Vec<bool> {
@@ -31,17 +32,10 @@ pub(crate) fn barycentric(mesh: &mut TriangleMesh) -> usize {
         return 0;
     }
     let mut uvs = mesh.uvs.take().unwrap_or_else(|| vec![Vec2::NAN; mesh.positions.len()]);
-    for (triangle, _) in mesh.triangles.iter_mut().zip(without).filter(|(_, is_without)| *is_without) {
+    for triangle in (0..without.len()).filter(|triangle| without[*triangle]) {
         // Each face needs corners of its own.
-        for (vertex, uv) in triangle.iter_mut().zip([Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::ZERO]) {
-            let old = *vertex as usize;
-            *vertex = mesh.positions.len() as u32;
-            mesh.positions.push(mesh.positions[old]);
-            if let Some(normals) = &mut mesh.normals {
-                normals.push(normals[old]);
-            }
-            uvs.push(uv);
-        }
+        mesh.triangles[triangle] = mesh.triangles[triangle].map(|vertex| mesh.copy_vertex(vertex));
+        uvs.extend([Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::ZERO]);
     }
     mesh.uvs = Some(uvs);
     // The old corners of these faces may be used no more.
@@ -103,8 +97,7 @@ impl Means {
             };
             // One texel of a sound texture is sound.
             let texture = Texture::new(1, 1, texels, texture.wrap()).unwrap_or_else(|_| texture.clone());
-            scene.textures.push(SourceTexture { name: format!("{name} (mean)"), sha256: None, texture });
-            TextureIndex(scene.textures.len() - 1)
+            scene.add_texture(SourceTexture::computed(format!("{name} (mean)"), texture))
         })
     }
 
@@ -118,8 +111,7 @@ impl Means {
         for texture in material.texture_indices_mut() {
             *texture = self.texture(scene, *texture);
         }
-        scene.materials.push(material);
-        let flat = MaterialIndex(scene.materials.len() - 1);
+        let flat = scene.add_material(material);
         self.materials.insert(index, flat);
         flat
     }
@@ -171,11 +163,8 @@ impl Means {
 /// The mean colour of a texture's texels, summed in f64.
 pub(crate) fn mean_color(texture: &Texture) -> [f64; 3] {
     let mut sum = [0.0; 3];
-    for y in 0..texture.height() {
-        for x in 0..texture.width() {
-            let texel = texture.texel(x, y);
-            sum.iter_mut().zip(texel).for_each(|(s, v)| *s += f64::from(v));
-        }
+    for texel in texture.linear_texels() {
+        sum.iter_mut().zip(texel).for_each(|(s, v)| *s += f64::from(v));
     }
     sum.map(|s| s / (texture.width() * texture.height()) as f64)
 }
@@ -192,15 +181,15 @@ mod tests {
     fn scene(uvs: Option<Vec<Vec2>>) -> (ReferenceScene, Vec<InstanceOrigin>) {
         let texture = Texture::new(2, 1, Texels::Linear(vec![[0.0; 3], [1.0; 3]]), Wrap::Repeat).unwrap();
         let reflectance = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
-        let model = MaterialModel::Diffuse { reflectance, alpha: None };
+        let material = Material::new("m", MaterialModel::Diffuse { reflectance, alpha: None });
         let scene = ReferenceScene {
             surfaces: vec![Surface {
                 name: "square".to_owned(),
                 mesh: TriangleMesh { uvs, ..rectangle() },
                 material: MaterialIndex(0),
             }],
-            materials: vec![Material { name: "m".to_owned(), model, two_sided: true, opacity: None, bump: None }],
-            textures: vec![SourceTexture { name: "t".to_owned(), sha256: None, texture }],
+            materials: vec![material],
+            textures: vec![SourceTexture::computed("t", texture)],
             ..ReferenceScene::default()
         };
         (scene, vec![InstanceOrigin::default()])

@@ -1,7 +1,5 @@
-//! The scene that every reader makes, and what they all do while they make it: collect findings, name things apart,
-//! move far scenes near to the origin, and count the JSON before it is parsed.
+//! The scene that every reader makes, its licence, what is missing of it, and how a far one is moved near to the origin.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
@@ -12,6 +10,8 @@ use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, 
 use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_image::ImageError;
+
+use crate::log::Log;
 
 /// A licence that must be passed on with the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,19 +56,44 @@ pub struct Missing {
     pub what: &'static str,
     /// How many of them the scene names.
     pub wanted: usize,
-    /// The paths of the missing ones.
     pub files: Vec<String>,
 }
 
 impl Missing {
     /// Of the files that a scene names, those that do not exist.
-    pub fn files(read: &[(String, String)], absent: &[String]) -> Self {
+    pub(crate) fn files(read: &[(String, String)], absent: &[String]) -> Self {
         let files: Vec<String> = absent.iter().filter(|file| !is_optional(file)).cloned().collect();
         Self { what: "files that the scene names", wanted: read.len().saturating_sub(1) + files.len(), files }
     }
 }
 
-/// A scene read from any source.
+/// A scene as the reader of one file gives it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileScene {
+    /// Surfaces, materials, textures and lights, in world space.
+    pub scene: ReferenceScene,
+    /// Facts about each surface, in the order of `scene.surfaces`.
+    pub origins: Vec<InstanceOrigin>,
+    /// Whether the file has lights of its own.
+    pub lights: SceneLights,
+    /// The first camera that can be used; a Mitsuba scene always has one. glTF states no picture size: it has 480
+    /// columns.
+    pub camera: Option<Camera>,
+    /// What was subtracted from the file's positions, in metres.
+    pub shift_m: DVec3,
+    /// Everything that was left out, replaced or approximated; sorted.
+    pub findings: Vec<Finding>,
+    /// The licence file beside the scene, if any.
+    pub licence: Option<LicenceText>,
+    /// Every file that was read, relative to the scene's folder with forward slashes, and its SHA-256 in hex; sorted.
+    pub files: Vec<(String, String)>,
+    /// Every file that was looked for but is missing; sorted.
+    pub absent: Vec<String>,
+    /// What the scene cannot do without and is missing.
+    pub missing: Missing,
+}
+
+/// A scene read from any source, with the camera of a recipe.
 #[derive(Clone, Debug)]
 pub struct SourceScene {
     pub kind: SourceKind,
@@ -86,7 +111,6 @@ pub struct SourceScene {
     pub scene: ReferenceScene,
     /// Facts about each surface, in the order of `scene.surfaces`.
     pub origins: Vec<InstanceOrigin>,
-    /// The camera of the input view.
     pub camera: Camera,
     /// What was subtracted from the source's positions, in metres.
     pub shift_m: DVec3,
@@ -151,125 +175,6 @@ pub(crate) fn shift_transform(shift: DVec3) -> DMat4 {
     if shift == DVec3::ZERO { DMat4::IDENTITY } else { DMat4::from_translation(-shift) }
 }
 
-/// The findings of a scene that is being read, each once.
-#[derive(Debug)]
-pub struct Log {
-    file: String,
-    limit: usize,
-    findings: BTreeSet<Finding>,
-    dropped: usize,
-}
-
-impl Log {
-    /// An empty log. Findings refer to `file` by default. Findings beyond `limit` are only counted.
-    pub fn new(file: String, limit: usize) -> Self {
-        Self { file, limit, findings: BTreeSet::new(), dropped: 0 }
-    }
-
-    /// The file that findings refer to by default.
-    pub fn file(&self) -> &str {
-        &self.file
-    }
-
-    /// Reports that something was left out or replaced.
-    pub fn warn(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
-        let file = self.file.clone();
-        self.push(Severity::Warning, code, &file, place, message, action);
-    }
-
-    /// Reports that something was read differently from how it is written, without loss.
-    pub fn note(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
-        let file = self.file.clone();
-        self.push(Severity::Note, code, &file, place, message, action);
-    }
-
-    /// Reports a finding about another file.
-    pub fn push(
-        &mut self,
-        severity: Severity,
-        code: &str,
-        file: &str,
-        place: &str,
-        message: impl Into<String>,
-        action: impl Into<String>,
-    ) {
-        if self.findings.len() >= self.limit {
-            self.dropped += 1;
-            return;
-        }
-        self.findings.insert(Finding {
-            severity,
-            code: code.to_owned(),
-            file: file.to_owned(),
-            place: place.to_owned(),
-            message: message.into(),
-            action: action.into(),
-        });
-    }
-
-    /// All findings, sorted.
-    pub fn into_findings(mut self) -> Vec<Finding> {
-        if self.dropped > 0 {
-            let (file, message) = (self.file.clone(), format!("{} findings are not listed", self.dropped));
-            self.limit = usize::MAX;
-            self.push(Severity::Warning, "too_many_findings", &file, "", message, "only counted them");
-        }
-        self.findings.into_iter().collect()
-    }
-}
-
-/// The names given so far.
-#[derive(Debug, Default)]
-pub(crate) struct UniqueNames {
-    taken: BTreeSet<String>,
-    /// By name: the last number that was appended to it.
-    numbers: BTreeMap<String, usize>,
-}
-
-impl UniqueNames {
-    /// The name, with `-2`, `-3` and so on appended where it is taken.
-    pub(crate) fn unique(&mut self, name: String) -> String {
-        let mut unique = name.clone();
-        while !self.taken.insert(unique.clone()) {
-            let number = self.numbers.entry(name.clone()).or_insert(1);
-            *number += 1;
-            unique = format!("{name}-{number}");
-        }
-        unique
-    }
-}
-
-/// The number of values in a JSON text. It is counted before the text is parsed, since two bytes of text can take a
-/// hundred bytes of memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct JsonSize {
-    /// Commas and colons outside strings.
-    pub(crate) values: usize,
-    /// Lists and objects.
-    pub(crate) containers: usize,
-}
-
-impl JsonSize {
-    /// Counts the values of the text, which need not be valid.
-    pub(crate) fn of(text: &[u8]) -> Self {
-        let (mut size, mut in_text, mut escaped) = (Self::default(), false, false);
-        for byte in text {
-            if in_text {
-                in_text = escaped || *byte != b'"';
-                escaped = !escaped && *byte == b'\\';
-                continue;
-            }
-            match byte {
-                b'"' => in_text = true,
-                b',' | b':' => size.values += 1,
-                b'[' | b'{' => size.containers += 1,
-                _ => {}
-            }
-        }
-        size
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -280,22 +185,5 @@ mod tests {
         assert_eq!(shift_of(DVec3::new(448_231.25, 120.125, -354_123.5)), DVec3::new(448_231.0, 120.0, -354_124.0));
         assert_eq!(shift_of(DVec3::NAN), DVec3::ZERO);
         assert_eq!(shift_transform(DVec3::ZERO), DMat4::IDENTITY);
-    }
-
-    #[test]
-    fn findings_are_sorted_unique_and_limited() {
-        let mut log = Log::new("scene.xml".into(), 2);
-        for code in ["b", "a", "b", "c", "d"] {
-            log.warn(code, "", "message", "action");
-        }
-        let codes: Vec<_> = log.into_findings().into_iter().map(|f| f.code).collect();
-        assert_eq!(codes, ["a", "b", "too_many_findings"]);
-    }
-
-    #[test]
-    fn later_names_are_numbered() {
-        let mut names = UniqueNames::default();
-        let given = ["lamp", "lamp-2", "lamp", "lamp"].map(|name| names.unique(name.to_owned()));
-        assert_eq!(given, ["lamp", "lamp-2", "lamp-3", "lamp-4"]);
     }
 }

@@ -6,20 +6,20 @@ use std::collections::HashMap;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use mateval_dataset::TriangleMesh;
 
-use crate::source_scene::Log;
+use crate::log::Log;
 
 /// Coordinates beyond this many metres are faults.
 const FARTHEST: f32 = 1e9;
 
 /// Counts of the repairs to a mesh.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub struct Repairs {
+pub(crate) struct Repairs {
     /// Triangles left out because a corner is not finite or too far away.
-    pub not_finite: usize,
+    pub(crate) not_finite: usize,
     /// Triangles without area, which are kept.
-    pub degenerate: usize,
+    pub(crate) degenerate: usize,
     /// Normals that were recomputed because they were zero or not finite.
-    pub normals: usize,
+    pub(crate) normals: usize,
 }
 
 impl Repairs {
@@ -44,7 +44,7 @@ impl Repairs {
 
 /// The mesh in world space. A mirroring transform keeps the front: the winding is reversed where the determinant is
 /// negative, and normals are transformed by the inverse transpose. `flip` swaps front and back.
-pub fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) -> (TriangleMesh, Repairs) {
+pub(crate) fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) -> (TriangleMesh, Repairs) {
     // Positions and normals.
     let mut repairs = Repairs::default();
     let linear = DMat3::from_mat4(world_from_object);
@@ -77,17 +77,22 @@ fn cofactors(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-fn is_degenerate(corners: [Vec3; 3]) -> bool {
+/// Twice the area of a triangle, and the square of its longest side.
+fn extent(corners: [Vec3; 3]) -> (f64, f64) {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    (b - a).cross(c - a).length() <= 1e-12 * longest
+    ((b - a).cross(c - a).length(), longest)
+}
+
+fn is_degenerate(corners: [Vec3; 3]) -> bool {
+    let (area, longest) = extent(corners);
+    area <= 1e-12 * longest
 }
 
 /// Whether a triangle has an area worth keeping; false where a corner is not finite.
-pub fn has_area(corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(|p| p.as_dvec3());
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    longest < 1e12 && (b - a).cross(c - a).length() > 1e-9 * longest
+pub(crate) fn has_area(corners: [Vec3; 3]) -> bool {
+    let (area, longest) = extent(corners);
+    longest < 1e12 && area > 1e-9 * longest
 }
 
 /// Drops vertices that are not finite or too far away and the triangles that use them. Returns the number of triangles.
@@ -130,7 +135,7 @@ fn repair_normals(mesh: &mut TriangleMesh) -> usize {
 /// Vertex normals of a smooth surface: the mean of the adjacent faces' normals, weighted by their angles at the vertex
 /// (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba computes them for an
 /// OBJ without normals.
-pub fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
+pub(crate) fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for (index, triangle) in mesh.triangles.iter().enumerate() {
         let corners = mesh.corners(index).map(|p| p.as_dvec3());
@@ -155,7 +160,7 @@ pub fn connected_parts(mesh: &TriangleMesh) -> Vec<usize> {
 }
 
 /// As [`connected_parts`], but only triangles of the same label are connected. `labels` holds one for each triangle.
-pub fn labelled_parts(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
+pub(crate) fn labelled_parts(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
     by_area(mesh, &component_of_triangles(mesh, labels))
 }
 
@@ -170,7 +175,7 @@ pub fn parts_of_labels(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
 fn by_area(mesh: &TriangleMesh, roots: &[usize]) -> Vec<usize> {
     let mut areas: HashMap<usize, f64> = HashMap::new();
     for (triangle, root) in roots.iter().enumerate() {
-        *areas.entry(*root).or_default() += area(mesh, triangle);
+        *areas.entry(*root).or_default() += mesh.triangle_area(triangle);
     }
     let mut by_area: Vec<(usize, f64)> = areas.into_iter().collect();
     // Equal areas are ordered by their first triangle, so that the order of the hash map has no effect.
@@ -222,11 +227,6 @@ pub(crate) fn find(parent: &mut [usize], mut member: usize) -> usize {
         member = parent[member];
     }
     member
-}
-
-fn area(mesh: &TriangleMesh, triangle: usize) -> f64 {
-    let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
-    (b - a).cross(c - a).length() / 2.0
 }
 
 #[cfg(test)]

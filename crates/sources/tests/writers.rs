@@ -12,7 +12,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use mateval_sources::gltf::{GltfScene, Limits, read};
+use mateval_sources::gltf::{Limits, read};
+use mateval_sources::source_scene::FileScene;
 
 fn set(name: &str) -> OsString {
     std::env::var_os(name).unwrap_or_else(|| panic!("{name} is not set: run tools/test_gltf.sh"))
@@ -23,7 +24,7 @@ fn script(name: &str) -> PathBuf {
 }
 
 /// Runs a command that writes `out`, and reads that file.
-fn written(command: &mut Command, out: &Path) -> GltfScene {
+fn written(command: &mut Command, out: &Path) -> FileScene {
     let done = command.arg(out).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let scene = read(out, None, &Limits::default()).unwrap();
@@ -33,7 +34,7 @@ fn written(command: &mut Command, out: &Path) -> GltfScene {
     scene
 }
 
-fn names(scene: &GltfScene) -> BTreeSet<&str> {
+fn names(scene: &FileScene) -> BTreeSet<&str> {
     scene.scene.surfaces.iter().map(|surface| surface.name.as_str()).collect()
 }
 

@@ -50,7 +50,7 @@ pub fn sphere(centre: Vec3, radius: f32, rings: u32) -> TriangleMesh {
 
 /// A two-sided material of `model`.
 pub fn material(model: MaterialModel) -> Material {
-    Material { name: String::new(), model, two_sided: true, opacity: None, bump: None }
+    Material::new("", model)
 }
 
 /// A grey Lambertian material.
@@ -158,7 +158,7 @@ pub fn box_room(more: Vec<TriangleMesh>) -> ReferenceScene {
     ];
     meshes.extend(more);
     let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-    let material = Material { name: String::new(), model, two_sided: true, opacity: None, bump: None };
+    let material = Material::new("", model);
     let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
     ReferenceScene {
         surfaces: meshes.into_iter().map(surface).collect(),

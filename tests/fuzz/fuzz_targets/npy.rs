@@ -5,7 +5,7 @@ use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
 use mateval_image::Wrap;
-use mateval_image::npy_numbers::whole_numbers;
+use mateval_image::npy_io::whole_numbers;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 
 fuzz_target!(|bytes: &[u8]| {

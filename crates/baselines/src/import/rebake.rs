@@ -2,8 +2,8 @@
 //! of the donor's surface.
 
 use glam::DVec3;
-use mateval_dataset::mesh::UvAtlas;
 use mateval_dataset::mesh::nearest_weights;
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_image::Picture;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use mateval_dataset::TriangleMesh;
-use mateval_dataset::mesh::UvAtlas;
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_image::{Mask, Picture};
 use rayon::prelude::*;
 

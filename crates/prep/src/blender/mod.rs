@@ -13,12 +13,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::material::Material;
-use mateval_dataset::reference::WrapWord;
 use mateval_dataset::reference::{LightGroup, ReferenceScene, Surface};
 use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json};
 use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture};
+use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture, Wrap};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
@@ -172,7 +171,7 @@ pub struct JobTexture {
     /// An EXR file.
     pub file: String,
     /// How it continues outside 0..1.
-    pub wrap: WrapWord,
+    pub wrap: Wrap,
 }
 
 /// A view.
@@ -288,7 +287,7 @@ fn write_texture(folder: &Path, at: usize, texture: &Texture) -> Result<JobTextu
         Texels::Srgb16(_) | Texels::Linear(_) | Texels::Grey(_) => Precision::Float,
     };
     exr_io::write_linear(&folder.join(&file), &texels, precision)?;
-    Ok(JobTexture { file, wrap: WrapWord::from(texture.wrap()) })
+    Ok(JobTexture { file, wrap: texture.wrap() })
 }
 
 /// Pictures of light: under all lights together, and under each light group alone.

@@ -16,7 +16,8 @@ use mateval_dataset::reference::{ReferenceScene, Surface};
 use mateval_dataset::{Finding, InstanceId, InstanceIndex, PartId, PartSetId, Role, Severity, TriangleMesh};
 use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_files::untrusted::shortened;
-use mateval_image::npy_numbers::{self, NpyError};
+use mateval_image::limits::Malformed;
+use mateval_image::npy_io;
 use mateval_sources::source_scene::InstanceOrigin;
 use mateval_sources::surface_mesh::{MAX_PARTS, connected_parts, parts_of_labels};
 
@@ -199,7 +200,7 @@ pub enum LabelFault {
         triangles: usize,
     },
     #[error("'{file}': {source}")]
-    Array { file: String, source: NpyError },
+    Array { file: String, source: Malformed },
     /// A file has another number of labels than its instance has triangles.
     #[error("'{file}' has {found} labels; expected {expected}, one for each triangle in the order of instances.glb")]
     Count { file: String, found: usize, expected: usize },
@@ -297,7 +298,7 @@ fn labels_of_instance(
     let triangles = mesh.triangles.len();
     let named = || file.to_owned();
     let relative = SourceFolder::relative(file)?;
-    let most = npy_numbers::max_bytes(triangles);
+    let most = npy_io::most_bytes(triangles);
     match folder.path(&relative) {
         Err(fault) if fault.code == "missing_file" => return Ok(None),
         Err(fault) => return Err(fault.into()),
@@ -310,7 +311,7 @@ fn labels_of_instance(
         }
     }
     let bytes = folder.read(&relative)?;
-    let labels = npy_numbers::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: named(), source })?;
+    let labels = npy_io::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: named(), source })?;
     if labels.len() != triangles {
         return Err(LabelFault::Count { file: named(), found: labels.len(), expected: triangles });
     }

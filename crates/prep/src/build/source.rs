@@ -1,13 +1,14 @@
 //! Reads a recipe's scene from its source, chooses the input camera, and reads the photo if the scene has one.
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use glam::DVec3;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
 use mateval_dataset::layout::{INPUT, SceneFolder};
-use mateval_dataset::material::{ColorInput, Material, MaterialModel, StatedParameters, TextureIndex};
-use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
+use mateval_dataset::material::{Material, MaterialModel, StatedParameters};
+use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, SourceTexture, SurfaceIndex};
 use mateval_dataset::{Progress, Report, Role, SceneLights, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
@@ -17,7 +18,7 @@ use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap};
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
-use mateval_sources::source_scene::{InstanceOrigin, Missing, SourceScene};
+use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceScene};
 use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
@@ -85,33 +86,48 @@ fn states(scene: &ReferenceScene, origins: &[InstanceOrigin], stated: fn(&Stated
 
 fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path) -> Result<SourceScene, PrepError> {
     let read = bitterli::read(&root.join(xml), given_place(entry), &bitterli::Limits::default())?;
+    let camera = bitterli_camera(recipe, entry, read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?;
     let folder = xml.parent().and_then(Path::file_name);
-    Ok(SourceScene {
-        kind: SourceKind::Bitterli,
-        lights: SceneLights::Own,
+    Ok(scene_of_file(read, SourceKind::Bitterli, folder, entry, xml, camera))
+}
+
+/// The scene of the `file` that the recipe names, seen from `camera`. The house is named after the scene without
+/// `house`.
+fn scene_of_file(
+    read: FileScene,
+    kind: SourceKind,
+    house: Option<&OsStr>,
+    entry: &RecipeScene,
+    file: &Path,
+    camera: Camera,
+) -> SourceScene {
+    SourceScene {
+        kind,
+        lights: read.lights,
         states_roughness: states(&read.scene, &read.origins, |stated| stated.roughness),
         states_metallic: states(&read.scene, &read.origins, |stated| stated.metallic),
-        origins: read.origins,
-        house: folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
-        file: xml.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        shift_m: read.shift_m,
-        camera: bitterli_camera(recipe, entry, &read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?,
+        house: house.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
+        file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         scene: read.scene,
+        origins: read.origins,
+        camera,
+        shift_m: read.shift_m,
         findings: read.findings,
-        missing: read.missing,
         licence: read.licence,
-        files: read.source_files,
-        absent: read.absent_files,
-    })
+        files: read.files,
+        absent: read.absent,
+        missing: read.missing,
+    }
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
 fn bitterli_camera(
     recipe: &Recipe,
     entry: &RecipeScene,
-    source: &Camera,
+    source: Option<Camera>,
     shift_m: DVec3,
 ) -> Result<Camera, SceneFault> {
+    let source = source.ok_or(SceneFault::NoCameraInFile)?;
     let old = source.intrinsics;
     let [width, height] = picture_size(recipe, entry, [old.width, old.height])?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
@@ -126,7 +142,7 @@ fn bitterli_camera(
         cx: old.cx * scale,
         cy: (old.cy - f64::from(old.height) / 2.0) * scale + f64::from(height) / 2.0,
     };
-    Ok(Camera { intrinsics, ..*source })
+    Ok(Camera { intrinsics, ..source })
 }
 
 /// The recipe's resolution, or else the source's. Fails where that is out of range.
@@ -142,23 +158,8 @@ fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[
 /// The scene of the glTF at `path`, which the recipe names as `file`.
 fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, path: &Path, file: &Path) -> Result<SourceScene, PrepError> {
     let read = gltf::read(path, given_place(entry), &gltf::Limits::default())?;
-    Ok(SourceScene {
-        kind: SourceKind::Gltf,
-        lights: read.lights,
-        states_roughness: states(&read.scene, &read.origins, |stated| stated.roughness),
-        states_metallic: states(&read.scene, &read.origins, |stated| stated.metallic),
-        shift_m: read.shift_m,
-        house: file.file_stem().map_or_else(|| entry.id.to_string(), |stem| stem.to_string_lossy().into_owned()),
-        file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        origins: read.origins,
-        camera: gltf_camera(recipe, entry, read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?,
-        scene: read.scene,
-        findings: read.findings,
-        missing: Missing::files(&read.source_files, &read.absent_files),
-        licence: read.licence,
-        files: read.source_files,
-        absent: read.absent_files,
-    })
+    let camera = gltf_camera(recipe, entry, read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?;
+    Ok(scene_of_file(read, SourceKind::Gltf, file.file_stem(), entry, file, camera))
 }
 
 /// The scene of a Blender file: baked to a glTF, with the light from outside that glTF does not have.
@@ -218,8 +219,7 @@ fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), Pr
         Some(BakedWorld::Constant { radiance }) => Emission::Constant { radiance: radiance.map(|v| v.max(0.0)) },
         Some(BakedWorld::Map { image, world_from_environment }) => {
             let texture = read_texture(&out.join(image), Encoding::Linear, Wrap::Repeat)?;
-            read.scene.textures.push(SourceTexture { name: "world".to_owned(), sha256: None, texture });
-            let texture = TextureIndex(read.scene.textures.len() - 1);
+            let texture = read.scene.add_texture(SourceTexture::computed("world", texture));
             Emission::Environment { texture, scale: 1.0, world_from_environment: *world_from_environment }
         }
     };
@@ -231,17 +231,7 @@ fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), Pr
 fn hide_lamps(read: &mut SourceScene, baked: &Baked) {
     for lamp in &baked.lamps {
         let Some(at) = read.scene.surfaces.iter().position(|surface| surface.name == lamp.node) else { continue };
-        let white = ColorInput::Constant([1.0; 3]);
-        let model =
-            MaterialModel::ThinDielectric { eta: 1.0, specular_reflectance: white, specular_transmittance: white };
-        read.scene.materials.push(Material {
-            name: "light".to_owned(),
-            model,
-            two_sided: true,
-            opacity: None,
-            bump: None,
-        });
-        read.scene.surfaces[at].material = MaterialIndex(read.scene.materials.len() - 1);
+        read.scene.surfaces[at].material = read.scene.add_material(Material::new("light", MaterialModel::clear()));
         read.origins[at].role = Role::LightFixture {};
         let is_its = |light: &&mut LightGroup| match &light.emission {
             Emission::Area { surfaces, .. } => surfaces.contains(&SurfaceIndex(at)),

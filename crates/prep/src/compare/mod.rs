@@ -25,9 +25,8 @@ use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{BuildFolder, COMPARE, SceneFolder};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::ReferenceScene;
-use mateval_dataset::render_file;
 use mateval_dataset::render_file::RENDER_FILE;
-use mateval_dataset::render_file::{CompareCounts, VERDICT_FORMAT};
+use mateval_dataset::verdict::{CompareCounts, VERDICT_FORMAT, VerdictFile};
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
 use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
 use mateval_image::{LinearRgb, Mask, Picture};
@@ -113,7 +112,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
 }
 
 /// The outcomes by scene, as the dataset's `compare.json` holds them.
-fn verdict(file: &CompareFile) -> render_file::VerdictFile {
+fn verdict(file: &CompareFile) -> VerdictFile {
     let mut scenes: BTreeMap<SceneId, CompareCounts> = BTreeMap::new();
     for (scene, _, check) in file.checks() {
         let counts = scenes.entry(scene.clone()).or_default();
@@ -123,7 +122,7 @@ fn verdict(file: &CompareFile) -> render_file::VerdictFile {
             State::TooNoisy | State::Undecided => counts.too_noisy += 1,
         }
     }
-    render_file::VerdictFile {
+    VerdictFile {
         format: VERDICT_FORMAT.to_owned(),
         tool: file.tool.clone(),
         manifest_sha256: file.dataset.manifest_sha256.clone(),

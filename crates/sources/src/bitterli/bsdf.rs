@@ -3,8 +3,8 @@
 //! by name.
 
 use mateval_dataset::material::{
-    BumpMap, ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour,
-    ScalarInput, StatedParameters,
+    BumpMap, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
+    StatedParameters,
 };
 use mateval_dataset::reference::MaterialIndex;
 use mateval_files::untrusted::shortened;
@@ -61,14 +61,8 @@ impl<'a> Reader<'a> {
 
     /// The material of a shape without a BSDF. As in Mitsuba, it is diffuse grey, or black where the shape emits.
     pub(super) fn default_material(&mut self, owner: &str, emits: bool) -> MaterialIndex {
-        let reflectance = if emits { 0.0 } else { 0.5 };
-        let material = Material {
-            name: owner.to_owned(),
-            model: diffuse(reflectance),
-            two_sided: false,
-            opacity: None,
-            bump: None,
-        };
+        let model = MaterialModel::grey(if emits { 0.0 } else { 0.5 });
+        let material = Material { two_sided: false, ..Material::new(owner, model) };
         // A lamp without a BSDF reflects nothing.
         let stated = if emits { StatedParameters::default() } else { UNSTATED };
         self.add_material(ReadMaterial { material, stated, is_one_of_several: false })
@@ -86,14 +80,12 @@ impl<'a> Reader<'a> {
     }
 
     fn add_material(&mut self, read: ReadMaterial) -> MaterialIndex {
-        self.scene.materials.push(read.material);
         self.stated.push(read.stated);
-        MaterialIndex(self.scene.materials.len() - 1)
+        self.scene.add_material(read.material)
     }
 
     fn flat_material(&mut self, outer: &'a Element, owner: &str) -> ReadMaterial {
-        let material =
-            Material { name: owner.to_owned(), model: diffuse(0.5), two_sided: false, opacity: None, bump: None };
+        let material = Material { two_sided: false, ..Material::new(owner, MaterialModel::grey(0.5)) };
         let mut read = ReadMaterial { material, stated: UNSTATED, is_one_of_several: false };
         let mut named = false;
         let mut element = outer;
@@ -225,8 +217,18 @@ impl<'a> Reader<'a> {
                 let alpha = Some(self.scalar(from, "alpha", 0.2));
                 MaterialModel::Diffuse { reflectance: self.color(from, "reflectance", 0.5), alpha }
             }
-            kind @ ("conductor" | "roughconductor") => self.conductor(from, kind == "roughconductor"),
-            kind @ ("plastic" | "roughplastic") => self.plastic(from, kind == "roughplastic"),
+            kind @ ("conductor" | "roughconductor") => MaterialModel::Conductor {
+                ior: self.conductor_ior(from),
+                specular_reflectance: self.color(from, "specular_reflectance", 1.0),
+                microfacets: (kind == "roughconductor").then(|| self.microfacets(from)),
+            },
+            kind @ ("plastic" | "roughplastic") => MaterialModel::Plastic {
+                eta: self.relative_index(from, "polypropylene"),
+                nonlinear: from.boolean("nonlinear", false, &mut self.log),
+                diffuse_reflectance: self.color(from, "diffuse_reflectance", 0.5),
+                specular_reflectance: self.color(from, "specular_reflectance", 1.0),
+                microfacets: (kind == "roughplastic").then(|| self.microfacets(from)),
+            },
             kind @ ("dielectric" | "roughdielectric") => MaterialModel::Dielectric {
                 eta: self.relative_index(from, "bk7"),
                 specular_reflectance: self.color(from, "specular_reflectance", 1.0),
@@ -243,26 +245,8 @@ impl<'a> Reader<'a> {
                 let message = format!("line {}: the bsdf '{}' is not known", element.line, shortened(element.kind()));
                 self.log.warn("unknown_plugin", &from.place, message, "used diffuse grey 0.5");
                 from.take_all();
-                diffuse(0.5)
+                MaterialModel::grey(0.5)
             }
-        }
-    }
-
-    fn conductor(&mut self, from: &mut Parameters<'a>, rough: bool) -> MaterialModel {
-        MaterialModel::Conductor {
-            ior: self.conductor_ior(from),
-            specular_reflectance: self.color(from, "specular_reflectance", 1.0),
-            microfacets: rough.then(|| self.microfacets(from)),
-        }
-    }
-
-    fn plastic(&mut self, from: &mut Parameters<'a>, rough: bool) -> MaterialModel {
-        MaterialModel::Plastic {
-            eta: self.relative_index(from, "polypropylene"),
-            nonlinear: from.boolean("nonlinear", false, &mut self.log),
-            diffuse_reflectance: self.color(from, "diffuse_reflectance", 0.5),
-            specular_reflectance: self.color(from, "specular_reflectance", 1.0),
-            microfacets: rough.then(|| self.microfacets(from)),
         }
     }
 
@@ -403,11 +387,6 @@ fn stated(kind: &str) -> StatedParameters {
         | "roughdielectric" | "thindielectric" | "principled" => StatedParameters::default(),
         _ => UNSTATED,
     }
-}
-
-fn diffuse(reflectance: f32) -> MaterialModel {
-    let reflectance = ColorInput::Constant([reflectance; 3]);
-    MaterialModel::Diffuse { reflectance, alpha: None }
 }
 
 fn place_of(element: &Element, owner: &str) -> String {

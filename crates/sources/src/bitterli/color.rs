@@ -7,8 +7,9 @@
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::{shortened, without_mark};
 
-use super::document::{Element, ValueError};
-use super::reader::{number, number_within, numbers, triple};
+use super::document::Element;
+use super::reader::{at_most, number, number_within, numbers, out_of_range, triple, words, wrong_count};
+use crate::open::Invalid;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorUse {
@@ -153,7 +154,7 @@ pub(super) fn constant_color(
     usage: ColorUse,
     major_version: u32,
     folder: &mut SourceFolder,
-) -> Result<[f64; 3], ValueError> {
+) -> Result<[f64; 3], Invalid> {
     let text = element.attribute("value").unwrap_or("").trim();
     match element.tag.as_str() {
         "float" | "integer" => Ok([number(text)?; 3]),
@@ -161,15 +162,21 @@ pub(super) fn constant_color(
         "rgb" => triple(text),
         "srgb" if text.starts_with('#') => hex(text),
         "srgb" => Ok(triple(text)?.map(linear)),
-        "blackbody" if usage == ColorUse::Reflectance => Err(ValueError::NotAReflectance),
+        "blackbody" if usage == ColorUse::Reflectance => Err(Invalid::new(NOT_A_REFLECTANCE)),
         "blackbody" => {
             let kelvin = element.attribute("temperature").unwrap_or("").trim().trim_end_matches(['k', 'K']);
             let scale = element.attribute("scale").map_or(Ok(1.0), number)?;
             Ok(of_black_body(number_within(kelvin, 1.0, 1e6)?).map(|v| v * scale))
         }
         "spectrum" => spectrum(element, text, usage, major_version, folder),
-        other => Err(ValueError::NotAColor { found: shortened(other) }),
+        other => Err(not_a_color(other)),
     }
+}
+
+const NOT_A_REFLECTANCE: &str = "expected a reflectance, found the emission of a black body";
+
+fn not_a_color(found: &str) -> Invalid {
+    Invalid(format!("expected a colour, found <{}>", shortened(found)))
 }
 
 fn linear(value: f64) -> f64 {
@@ -177,8 +184,8 @@ fn linear(value: f64) -> f64 {
 }
 
 /// `#rrggbb`, sRGB.
-fn hex(text: &str) -> Result<[f64; 3], ValueError> {
-    let refused = || ValueError::NotHex { found: shortened(text) };
+fn hex(text: &str) -> Result<[f64; 3], Invalid> {
+    let refused = || Invalid(format!("expected # and six hexadecimal digits, found '{}'", shortened(text)));
     let digits =
         text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.bytes().all(|b| b.is_ascii_hexdigit()));
     let word = u32::from_str_radix(digits.ok_or_else(refused)?, 16).map_err(|_| refused())?;
@@ -191,23 +198,23 @@ fn spectrum(
     usage: ColorUse,
     major_version: u32,
     folder: &mut SourceFolder,
-) -> Result<[f64; 3], ValueError> {
+) -> Result<[f64; 3], Invalid> {
     // By plugin, as in Mitsuba 2 and 3: by children, or by attributes of the same names.
     let child = |name: &str| {
         let found = element.children.iter().find(|child| child.name() == name);
         found.map_or_else(|| element.attribute(name), |child| child.attribute("value"))
     };
-    let needed = |name: &'static str| child(name).ok_or(ValueError::Missing { name });
+    let needed = |name: &'static str| child(name).ok_or_else(|| Invalid(format!("expected '{name}', found none")));
     match element.kind() {
         "" => {}
         "uniform" => return Ok([number(needed("value")?)?; 3]),
         "d65" => return Ok([child("scale").map_or(Ok(1.0), number)?; 3]),
-        "blackbody" if usage == ColorUse::Reflectance => return Err(ValueError::NotAReflectance),
+        "blackbody" if usage == ColorUse::Reflectance => return Err(Invalid::new(NOT_A_REFLECTANCE)),
         "blackbody" => return Ok(of_black_body(number_within(needed("temperature")?, 1.0, 1e6)?)),
         "irregular" => {
             let (wavelengths, values) = (many(needed("wavelengths")?)?, many(needed("values")?)?);
             if wavelengths.len() != values.len() {
-                return Err(ValueError::Count { expected: "as many values as wavelengths", found: values.len() });
+                return Err(wrong_count("as many values as wavelengths", values.len()));
             }
             return integrated(&wavelengths.into_iter().zip(values).collect::<Vec<_>>(), usage);
         }
@@ -218,38 +225,27 @@ fn spectrum(
             let pair = |(at, value): (usize, f64)| (least + (most - least) * at as f64 / last, value);
             return integrated(&values.into_iter().enumerate().map(pair).collect::<Vec<_>>(), usage);
         }
-        other => return Err(ValueError::NotAColor { found: shortened(other) }),
+        other => return Err(not_a_color(other)),
     }
     // By pairs, in a file or in the text.
     if let Some(name) = element.attribute("filename") {
         let read = SourceFolder::relative(name).and_then(|name| folder.read(&name));
-        let bytes = read.map_err(|fault| ValueError::File { reason: fault.message })?;
+        let bytes = read.map_err(|fault| Invalid(fault.message))?;
         let text = String::from_utf8_lossy(without_mark(&bytes));
         let lines = text.lines().map(|line| line.split('#').next().unwrap_or("").trim());
         let pair = |line: &str| match many(line)?[..] {
             [wavelength, value] => Ok((wavelength, value)),
-            ref other => Err(ValueError::Count { expected: "2", found: other.len() }),
+            ref other => Err(wrong_count("2", other.len())),
         };
-        let lines = lines.filter(|line| !line.is_empty()).take(MOST_PAIRS + 1);
-        let pairs = lines.map(pair).collect::<Result<Vec<_>, _>>()?;
-        return if pairs.len() > MOST_PAIRS {
-            Err(ValueError::TooManyNumbers { most: MOST_PAIRS })
-        } else {
-            integrated(&pairs, usage)
-        };
+        return integrated(&at_most(MOST_PAIRS, lines.filter(|line| !line.is_empty()), pair)?, usage);
     }
     if text.contains(':') {
-        let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
         let pair = |word: &str| {
-            let (wavelength, value) = word.split_once(':').ok_or(ValueError::NotAPair { found: shortened(word) })?;
+            let refused = || Invalid(format!("expected wavelength:value, found '{}'", shortened(word)));
+            let (wavelength, value) = word.split_once(':').ok_or_else(refused)?;
             Ok((number(wavelength)?, number(value)?))
         };
-        let pairs = words.take(MOST_PAIRS + 1).map(pair).collect::<Result<Vec<_>, ValueError>>()?;
-        return if pairs.len() > MOST_PAIRS {
-            Err(ValueError::TooManyNumbers { most: MOST_PAIRS })
-        } else {
-            integrated(&pairs, usage)
-        };
+        return integrated(&at_most(MOST_PAIRS, words(text), pair)?, usage);
     }
     // One value is the same at all wavelengths, which Mitsuba 2 and 3 do not take for white where it emits.
     match numbers(text)?[..] {
@@ -260,22 +256,20 @@ fn spectrum(
     }
 }
 
-fn many(text: &str) -> Result<Vec<f64>, ValueError> {
-    let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
-    let list = words.take(MOST_PAIRS + 1).map(number).collect::<Result<Vec<_>, _>>()?;
-    if list.len() > MOST_PAIRS { Err(ValueError::TooManyNumbers { most: MOST_PAIRS }) } else { Ok(list) }
+fn many(text: &str) -> Result<Vec<f64>, Invalid> {
+    at_most(MOST_PAIRS, words(text), number)
 }
 
 /// The colour of a spectrum of pairs of wavelength in nanometres and value, between which it is linear. It is 0
 /// outside.
-fn integrated(pairs: &[(f64, f64)], usage: ColorUse) -> Result<[f64; 3], ValueError> {
+fn integrated(pairs: &[(f64, f64)], usage: ColorUse) -> Result<[f64; 3], Invalid> {
     if pairs.len() < 2 || pairs.windows(2).any(|two| two[0].0 >= two[1].0) {
-        return Err(ValueError::NotASpectrum);
+        return Err(Invalid::new("expected two or more wavelengths, each above the one before"));
     }
     // A reflectance in percent, say, would be clamped to white below.
     let outside = pairs.iter().find(|(_, value)| !(0.0..=MOST_REFLECTANCE).contains(value));
     if let (ColorUse::Reflectance, Some((_, found))) = (usage, outside) {
-        return Err(ValueError::OutOfRange { least: 0.0, most: 1.0, found: *found });
+        return Err(out_of_range(0.0, 1.0, *found));
     }
     let range = STEP_NM * (SAMPLES - 1) as f64;
     let mut xyz = [0.0; 3];
@@ -343,9 +337,9 @@ pub(super) fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
 mod tests {
     use super::*;
     use crate::bitterli::document::Document;
-    use crate::source_scene::Log;
+    use crate::log::Log;
 
-    fn color(element: &str, usage: ColorUse) -> Result<[f64; 3], ValueError> {
+    fn color(element: &str, usage: ColorUse) -> Result<[f64; 3], Invalid> {
         let folder = tempfile::tempdir().unwrap();
         let spectrum = "# nm value\n400 0.05\n500 0.05\n600 0.7\n700 0.7\n";
         std::fs::write(folder.path().join("a.spd"), spectrum).unwrap();

@@ -1,12 +1,13 @@
-//! The XML as a tree of plain elements, with variables substituted and names in snake_case. Depth and size are checked
-//! first.
+//! The XML as a tree of plain elements, with variables substituted and names in snake_case. Size is checked
+//! first, and depth while the tree is made: the parser does not recurse.
 
 use std::collections::BTreeMap;
 
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::{hint, shortened, without_mark};
 
-use crate::source_scene::Log;
+use crate::log::Log;
+use crate::open::Invalid;
 
 /// Limits on an untrusted scene, checked before memory is taken. Exceeding one is an error for the XML itself, and a
 /// finding for anything else.
@@ -15,16 +16,12 @@ pub struct Limits {
     /// Bytes of the XML, before and after variables are substituted.
     pub xml_bytes: u64,
     pub xml_depth: usize,
-    /// Bytes of any other file.
     pub file_bytes: u64,
     /// Bytes of all OBJ files, each counted as often as it is named. Once exceeded, no further file is read.
     pub mesh_bytes: u64,
     pub shapes: usize,
-    /// Triangles of all shapes.
     pub triangles: usize,
-    /// Vertices of all shapes.
     pub vertices: usize,
-    /// Texels of all textures.
     pub texels: usize,
     /// Number of findings. Further ones are only counted.
     pub findings: usize,
@@ -44,66 +41,6 @@ impl Default for Limits {
             findings: 5_000,
         }
     }
-}
-
-/// Why XML is not a Mitsuba scene, has no usable camera, or exceeds a limit.
-#[derive(Debug, thiserror::Error)]
-pub enum BitterliError {
-    #[error("expected well-formed XML: {reason}")]
-    NotXml { reason: roxmltree::Error },
-    #[error("line {line}: expected elements nested at most {most} deep, found deeper ones")]
-    TooDeep { line: usize, most: usize },
-    #[error("line {line}: the scene with its variables substituted is too large")]
-    TooLarge { line: usize },
-    #[error("expected a Mitsuba scene, whose root element is <scene>, found <{found}>")]
-    NotAScene { found: String },
-    #[error("expected a <sensor>, found none")]
-    NoSensor,
-    #[error("line {line}: the sensor '{kind}' is not supported; expected 'perspective' (a pinhole camera)")]
-    OtherSensor { line: usize, kind: String },
-    #[error("line {line}: <include>: {reason}")]
-    Include { line: usize, reason: String },
-    #[error("line {line}: focal_length of the sensor: {reason}")]
-    FocalLength { line: usize, reason: ValueError },
-    #[error("line {line}: expected a readable to_world of the sensor, found one with a faulty step")]
-    SensorTransform { line: usize },
-    #[error("line {line}: expected an invertible to_world of the sensor, found a singular one")]
-    SingularSensor { line: usize },
-}
-
-/// Why the text of a parameter is not the value that is wanted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ValueError {
-    #[error("expected a finite number, found '{found}'")]
-    NotANumber { found: String },
-    #[error("expected {least} to {most}, found {found}")]
-    OutOfRange { least: f64, most: f64, found: f64 },
-    #[error("expected a number above 0, found {found}")]
-    NotPositive { found: f64 },
-    #[error("expected {expected} numbers, found {found}")]
-    Count {
-        /// The lengths allowed, as in `1 or 3`.
-        expected: &'static str,
-        found: usize,
-    },
-    #[error("expected at most {most} numbers, found more")]
-    TooManyNumbers { most: usize },
-    #[error("expected true or false, found '{found}'")]
-    NotABoolean { found: String },
-    #[error("expected # and six hexadecimal digits, found '{found}'")]
-    NotHex { found: String },
-    #[error("expected wavelength:value, found '{found}'")]
-    NotAPair { found: String },
-    #[error("expected two or more wavelengths, each above the one before")]
-    NotASpectrum,
-    #[error("expected '{name}', found none")]
-    Missing { name: &'static str },
-    #[error("{reason}")]
-    File { reason: String },
-    #[error("expected a reflectance, found the emission of a black body")]
-    NotAReflectance,
-    #[error("expected a colour, found <{found}>")]
-    NotAColor { found: String },
 }
 
 #[derive(Debug)]
@@ -148,7 +85,6 @@ impl Element {
     }
 }
 
-/// A scene file.
 #[derive(Debug)]
 pub(super) struct Document {
     pub(super) root: Element,
@@ -170,9 +106,9 @@ impl Document {
         limits: &Limits,
         folder: &mut SourceFolder,
         log: &mut Log,
-    ) -> Result<Self, BitterliError> {
-        check_depth(text, limits.xml_depth)?;
-        let xml = roxmltree::Document::parse(text).map_err(|reason| BitterliError::NotXml { reason })?;
+    ) -> Result<Self, Invalid> {
+        let xml = roxmltree::Document::parse(text)
+            .map_err(|reason| Invalid(format!("expected well-formed XML: {reason}")))?;
         let mut builder = Builder {
             line_starts: line_starts(text),
             variables: BTreeMap::new(),
@@ -185,7 +121,9 @@ impl Document {
         };
         let root = builder.element(xml.root_element(), 0)?;
         if root.tag != "scene" {
-            return Err(BitterliError::NotAScene { found: shortened(&root.tag) });
+            let found = shortened(&root.tag);
+            let what = format!("expected a Mitsuba scene, whose root element is <scene>, found <{found}>");
+            return Err(Invalid(what));
         }
         let major_version = major_version(&root, log);
         Ok(Self { root, major_version })
@@ -193,7 +131,7 @@ impl Document {
 
     /// Parses XML that includes no files.
     #[cfg(test)]
-    pub(super) fn parse_text(text: &str, log: &mut Log) -> Result<Self, BitterliError> {
+    pub(super) fn parse_text(text: &str, log: &mut Log) -> Result<Self, Invalid> {
         let folder = tempfile::tempdir().unwrap();
         Self::parse(text, &Limits::default(), &mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), log)
     }
@@ -249,56 +187,8 @@ fn major_version(root: &Element, log: &mut Log) -> u32 {
     }
 }
 
-/// Refuses XML nested deeper than `limit` before it is parsed, since the parser may recurse.
-fn check_depth(text: &str, limit: usize) -> Result<(), BitterliError> {
-    let bytes = text.as_bytes();
-    let (mut at, mut depth) = (0, 0_usize);
-    while let Some(step) = bytes[at..].iter().position(|&b| b == b'<') {
-        at += step;
-        let rest = &bytes[at..];
-        // Comments, character data and instructions are skipped; a tag opens or closes an element, or does both.
-        if rest.starts_with(b"<!--") {
-            at += after(rest, b"-->", 4);
-        } else if rest.starts_with(b"<![CDATA[") {
-            at += after(rest, b"]]>", 9);
-        } else if rest.starts_with(b"<?") {
-            at += after(rest, b"?>", 2);
-        } else {
-            let length = tag_length(rest);
-            if rest.starts_with(b"</") {
-                depth = depth.saturating_sub(1);
-            } else if !rest[..length].ends_with(b"/>") {
-                depth += 1;
-            }
-            at += length;
-        }
-        if depth > limit {
-            let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
-            return Err(BitterliError::TooDeep { line, most: limit });
-        }
-    }
-    Ok(())
-}
-
-/// The number of bytes up to and including the first `end` at or after `from`, or of all bytes where there is none.
-fn after(bytes: &[u8], end: &[u8], from: usize) -> usize {
-    let from = from.min(bytes.len());
-    bytes[from..].windows(end.len()).position(|window| window == end).map_or(bytes.len(), |at| from + at + end.len())
-}
-
-/// The number of bytes of a tag up to and including its `>`. A quoted `>` does not count.
-fn tag_length(bytes: &[u8]) -> usize {
-    let mut quote = None;
-    for (at, &byte) in bytes.iter().enumerate() {
-        match quote {
-            Some(open) if byte == open => quote = None,
-            Some(_) => {}
-            None if byte == b'"' || byte == b'\'' => quote = Some(byte),
-            None if byte == b'>' => return at + 1,
-            None => {}
-        }
-    }
-    bytes.len()
+fn too_deep(line: usize, most: usize) -> Invalid {
+    Invalid(format!("line {line}: expected elements nested at most {most} deep, found deeper ones"))
 }
 
 /// Turns the parser's nodes into elements, in document order, so that a `<default>` applies to what follows it.
@@ -321,10 +211,10 @@ fn line_starts(text: &str) -> Vec<usize> {
 }
 
 impl Builder<'_> {
-    fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Element, BitterliError> {
+    fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Element, Invalid> {
         let line = self.line_starts.partition_point(|&start| start <= node.range().start);
         if depth > self.depth_limit {
-            return Err(BitterliError::TooDeep { line, most: self.depth_limit });
+            return Err(too_deep(line, self.depth_limit));
         }
         self.serial += 1;
         let serial = self.serial;
@@ -348,9 +238,9 @@ impl Builder<'_> {
 
     /// The elements of the file that an `<include>` names. As in Mitsuba, they stand in its place, and variables are
     /// shared.
-    fn included(&mut self, include: &Element, depth: usize) -> Result<Vec<Element>, BitterliError> {
+    fn included(&mut self, include: &Element, depth: usize) -> Result<Vec<Element>, Invalid> {
         let line = include.line;
-        let refused = |reason| BitterliError::Include { line, reason };
+        let refused = |reason| Invalid(format!("line {line}: <include>: {reason}"));
         let name = include.attribute("filename").unwrap_or("");
         let file = SourceFolder::relative(name).map_err(|fault| refused(fault.message))?;
         if self.files.contains(&file) || self.files.len() >= MOST_INCLUDES {
@@ -360,7 +250,6 @@ impl Builder<'_> {
         self.spend(bytes.len(), line)?;
         let not_text = |_| refused(format!("'{}' is not UTF-8{}", shortened(&file), hint(&bytes)));
         let text = std::str::from_utf8(without_mark(&bytes)).map_err(not_text)?;
-        check_depth(text, self.depth_limit)?;
         let xml = roxmltree::Document::parse(text)
             .map_err(|reason| refused(format!("'{}': expected well-formed XML: {reason}", shortened(&file))))?;
         // Its own lines, until it ends.
@@ -374,7 +263,7 @@ impl Builder<'_> {
         Ok(if root.tag == "scene" { root.children } else { vec![root] })
     }
 
-    fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), BitterliError> {
+    fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), Invalid> {
         let value = self.with_variables(attribute.value(), line)?;
         let key = attribute.name();
         Ok((key.to_owned(), if key == "name" { snake_case(&value) } else { value }))
@@ -394,7 +283,7 @@ impl Builder<'_> {
     }
 
     /// `text` with every `$` and the longest variable name that follows replaced by the variable's value.
-    fn with_variables(&mut self, text: &str, line: usize) -> Result<String, BitterliError> {
+    fn with_variables(&mut self, text: &str, line: usize) -> Result<String, Invalid> {
         let mut out = String::new();
         let mut rest = text;
         while let Some(at) = rest.find('$') {
@@ -426,8 +315,9 @@ impl Builder<'_> {
     }
 
     /// Takes `bytes` from the budget of substituted text, since variables within variables can grow exponentially.
-    fn spend(&mut self, bytes: usize, line: usize) -> Result<(), BitterliError> {
-        self.budget = self.budget.checked_sub(bytes as u64).ok_or(BitterliError::TooLarge { line })?;
+    fn spend(&mut self, bytes: usize, line: usize) -> Result<(), Invalid> {
+        let too_large = || Invalid(format!("line {line}: the scene with its variables substituted is too large"));
+        self.budget = self.budget.checked_sub(bytes as u64).ok_or_else(too_large)?;
         Ok(())
     }
 }
@@ -450,7 +340,7 @@ fn snake_case(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> (Result<Document, BitterliError>, Vec<mateval_dataset::Finding>) {
+    fn parse(text: &str) -> (Result<Document, Invalid>, Vec<mateval_dataset::Finding>) {
         let mut log = Log::new("scene.xml".into(), 100);
         let document = Document::parse_text(text, &mut log);
         (document, log.into_findings())
@@ -489,13 +379,13 @@ mod tests {
             text += &format!(r#"<default name="a{step}" value="$a{p}$a{p}"/>"#, p = step - 1);
         }
         let error = parse(&(text + "</scene>")).0.unwrap_err();
-        assert!(matches!(error, BitterliError::TooLarge { line: 1 }), "{error}");
+        assert!(error.to_string().contains("line 1: the scene with its variables"), "{error}");
     }
 
     #[test]
     fn ten_thousand_deep_is_an_error() {
         let deep = format!("{}{}", "<scene>".repeat(10_000), "</scene>".repeat(10_000));
-        assert!(matches!(parse(&deep).0, Err(BitterliError::TooDeep { line: 1, most: 64 })));
+        assert_eq!(parse(&deep).0.unwrap_err(), too_deep(1, 64));
         // Twin: the same number of siblings passes, as do brackets in comments and quotes.
         let wide = format!("<scene version='3.0.0'>{}</scene>", "<a b='>'/><!-- <a><a> -->".repeat(10_000));
         assert_eq!(parse(&wide).0.unwrap().root.children.len(), 10_000);

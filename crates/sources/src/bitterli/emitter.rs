@@ -17,7 +17,6 @@ use mateval_image::{Texels, Texture, Wrap};
 use super::color::{CIE_Y_INTEGRAL, ColorUse, black_body, rec709_from_xyz};
 use super::document::Element;
 use super::reader::{COLORS, Parameters, Reader, rotation, vector};
-use super::texture::all_texels;
 use crate::missing_uv::mean_color;
 use crate::primitives::{MapDisc, ROWS, texel_direction};
 
@@ -113,7 +112,7 @@ impl<'a> Reader<'a> {
     }
 
     fn is_not_negative(&self, texture: TextureIndex) -> bool {
-        all_texels(&self.scene.textures[texture.0].texture, |texel| texel.iter().all(|v| *v >= 0.0))
+        self.scene.textures[texture.0].texture.linear_texels().flatten().all(|v| v >= 0.0)
     }
 
     fn mean_of(&self, texture: TextureIndex) -> [f32; 3] {
@@ -304,7 +303,6 @@ impl Dome {
     }
 }
 
-/// The sun's effective temperature in kelvin.
 const SUN_KELVIN: f64 = 5778.0;
 
 /// Ozone absorption in 1/cm every 20 nm from 440 nm (Preetham's table 2).

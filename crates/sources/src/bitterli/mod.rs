@@ -1,6 +1,6 @@
 //! Reads Bitterli's scenes: Mitsuba XML of versions 0.5, 0.6 and 3, with OBJ meshes and textures beside it.
 //!
-//! The input is the path of a scene's XML; no file outside its folder is read. The output is a [`BitterliScene`].
+//! The input is the path of a scene's XML; no file outside its folder is read. The output is a [`FileScene`].
 //! Elements that are unknown, missing or faulty are left out or replaced and reported as findings. An error means that
 //! there is no scene to read or no camera to look through.
 //!
@@ -25,52 +25,27 @@ use std::path::Path;
 
 use glam::DVec3;
 use mateval_dataset::reference::ReferenceScene;
-use mateval_dataset::{Camera, Finding};
+use mateval_dataset::{Camera, SceneLights};
 use mateval_files::untrusted::{hint, shortened, without_mark};
 
 use crate::coincident;
-use crate::error::{InvalidSource, SourceError, open};
-use crate::source_scene::{
-    InstanceOrigin, LicenceText, Log, Missing, UniqueNames, is_optional, read_licence, report_shift, shift_of,
-};
+use crate::log::{Log, UniqueNames};
+use crate::open::{Invalid, SourceError, open};
+use crate::source_scene::{FileScene, InstanceOrigin, Missing, is_optional, read_licence, report_shift, shift_of};
 use document::Document;
-pub use document::{BitterliError, Limits, ValueError};
+pub use document::Limits;
 use reader::{Reader, Totals};
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct BitterliScene {
-    /// Name and author from the licence, as in `'Modern Hall' by NewSee2l035`, or else the folder's name.
-    pub title: String,
-    /// Surfaces, materials, textures and lights, in world space.
-    pub scene: ReferenceScene,
-    /// Facts about each surface, in the order of `scene.surfaces`.
-    pub origins: Vec<InstanceOrigin>,
-    /// What was subtracted from the scene's positions, in metres.
-    pub shift_m: DVec3,
-    /// The first sensor. The picture's size is that of the film's crop window.
-    pub camera: Camera,
-    /// Everything that was left out, replaced or approximated; sorted.
-    pub findings: Vec<Finding>,
-    /// The licence file beside the XML, if any.
-    pub licence: Option<LicenceText>,
-    /// Every file that was read, relative to the XML's folder with forward slashes, and its SHA-256 in hex; sorted.
-    pub source_files: Vec<(String, String)>,
-    /// Every file that was looked for but is missing; sorted.
-    pub absent_files: Vec<String>,
-    /// Shapes and textures that are missing.
-    pub missing: Missing,
-}
 
 /// Reads the scene whose XML is at `xml_path`. `camera` is the place of the camera that will be used instead of the
 /// scene's own; it decides with that whether the scene is moved nearer to the origin.
 ///
 /// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
-pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<BitterliScene, SourceError> {
+pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileScene, SourceError> {
     // The XML as a tree.
-    let invalid = |error| SourceError::invalid(xml_path, InvalidSource::Bitterli(error));
+    let invalid = |invalid: Invalid| invalid.in_file(xml_path);
     let (mut source, name, bytes) = open(xml_path, limits.xml_bytes, limits.file_bytes)?;
     let text = std::str::from_utf8(without_mark(&bytes))
-        .map_err(|_| SourceError::invalid(xml_path, InvalidSource::NotUtf8 { hint: hint(&bytes).into_owned() }))?;
+        .map_err(|_| invalid(Invalid(format!("expected UTF-8, found other bytes{}", hint(&bytes)))))?;
     let mut log = Log::new(name, limits.findings);
     let document = Document::parse(text, limits, &mut source, &mut log).map_err(invalid)?;
     let ids = document.ids(&mut log);
@@ -102,21 +77,19 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<B
         origin.stated = reader.stated[surface.material.0];
     }
     coincident::separate(&mut reader.scene.surfaces, &mut origins, &mut reader.log);
-    // Its title, findings and files.
-    let title = title(licence.as_ref(), xml_path);
     let Reader { scene, log, source, shift_m, left_out, .. } = reader;
     let files = source.into_files();
-    Ok(BitterliScene {
-        title,
+    Ok(FileScene {
         scene,
         origins,
-        camera,
+        lights: SceneLights::Own,
+        camera: Some(camera),
         shift_m,
         findings: log.into_findings(),
         licence,
         missing: missing(&document, left_out, &files.absent),
-        source_files: files.hashes,
-        absent_files: files.absent,
+        files: files.hashes,
+        absent: files.absent,
     })
 }
 
@@ -129,28 +102,16 @@ fn missing(document: &Document, left_out: Vec<String>, absent: &[String]) -> Mis
     Missing { what: "shapes and textures", wanted, files: [left_out, pictures].concat() }
 }
 
-fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
-    let first = licence.and_then(|licence| licence.text.lines().next()).unwrap_or("");
-    let named = first.split_once("version of ").map(|(_, rest)| rest.split(',').next().unwrap_or(rest).trim());
-    if let Some(named) = named.filter(|named| !named.is_empty()) {
-        return shortened(named).replace("\\'", "'");
-    }
-    let folder = xml_path.canonicalize().ok().and_then(|path| path.parent()?.file_name().map(|n| n.to_owned()));
-    folder.map_or_else(|| "scene".to_owned(), |name| shortened(&name.to_string_lossy()))
-}
-
 /// Reads all elements directly below `<scene>`. Fails where none of them is a usable sensor. `place` is that of the
 /// camera that will be used instead.
-fn read_elements<'a>(
-    reader: &mut Reader<'a>,
-    document: &'a Document,
-    place: Option<DVec3>,
-) -> Result<Camera, BitterliError> {
+fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document, place: Option<DVec3>) -> Result<Camera, Invalid> {
     // What concerns all others: the folders of files, and the camera, which decides whether the scene is moved.
     let elements = || document.root.children.iter();
     reader.search =
         elements().filter(|e| e.tag == "path").filter_map(|e| e.attribute("value")).map(str::to_owned).collect();
-    let sensor = elements().find(|element| element.tag == "sensor").ok_or(BitterliError::NoSensor)?;
+    let sensor = elements()
+        .find(|element| element.tag == "sensor")
+        .ok_or_else(|| Invalid::new("expected a <sensor>, found none"))?;
     let camera = reader.sensor(sensor)?;
     reader.shift_m = shift_of(place.unwrap_or(camera.position()));
     report_shift(reader.shift_m, &mut reader.log);

@@ -10,8 +10,9 @@ use mateval_dataset::reference::{LightGroup, MaterialIndex, ReferenceScene};
 use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_files::untrusted::shortened;
 
-use super::document::{Element, Ids, Limits, ValueError};
-use crate::source_scene::{Log, UniqueNames};
+use super::document::{Element, Ids, Limits};
+use crate::log::{Log, UniqueNames};
+use crate::open::Invalid;
 
 /// A scene under construction.
 pub(super) struct Reader<'a> {
@@ -30,7 +31,6 @@ pub(super) struct Reader<'a> {
     pub(super) scene: ReferenceScene,
     /// Every texture looked up so far. None stands for a file that could not be used, which has been reported.
     pub(super) textures: BTreeMap<TextureKey, Option<TextureIndex>>,
-    /// Texels of all textures.
     pub(super) texels: usize,
     /// By file: whether it has an alpha channel that is not 1 everywhere.
     pub(super) alphas: BTreeMap<String, bool>,
@@ -136,7 +136,6 @@ impl<'a> Parameters<'a> {
         Some(child.element)
     }
 
-    /// Whether a child has this name.
     pub(super) fn contains(&self, name: &str) -> bool {
         self.children.iter().any(|child| child.name == name)
     }
@@ -183,7 +182,7 @@ impl<'a> Parameters<'a> {
     pub(super) fn value<T>(
         &mut self,
         name: &str,
-        read: impl Fn(&str) -> Result<T, ValueError>,
+        read: impl Fn(&str) -> Result<T, Invalid>,
         log: &mut Log,
     ) -> Option<T> {
         let element = self.take(&[name])?;
@@ -195,7 +194,7 @@ impl<'a> Parameters<'a> {
         &mut self,
         name: &str,
         element: &Element,
-        value: Result<T, ValueError>,
+        value: Result<T, Invalid>,
         log: &mut Log,
     ) -> Option<T> {
         let report = |error| {
@@ -272,36 +271,58 @@ fn resolve<'a>(reference: &Element, place: &str, ids: &Ids<'a>, log: &mut Log) -
 /// The longest list of numbers that any value has, with room to spare.
 const MOST_NUMBERS: usize = 64;
 
-pub(super) fn number(text: &str) -> Result<f64, ValueError> {
+pub(super) fn number(text: &str) -> Result<f64, Invalid> {
     let trimmed = text.trim();
-    let refused = || ValueError::NotANumber { found: shortened(trimmed) };
+    let refused = || Invalid(format!("expected a finite number, found '{}'", shortened(trimmed)));
     trimmed.parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(refused)
 }
 
 /// One number from `least` to `most`.
-pub(super) fn number_within(text: &str, least: f64, most: f64) -> Result<f64, ValueError> {
+pub(super) fn number_within(text: &str, least: f64, most: f64) -> Result<f64, Invalid> {
     let found = number(text)?;
-    if (least..=most).contains(&found) { Ok(found) } else { Err(ValueError::OutOfRange { least, most, found }) }
+    if (least..=most).contains(&found) { Ok(found) } else { Err(out_of_range(least, most, found)) }
+}
+
+pub(super) fn out_of_range(least: f64, most: f64, found: f64) -> Invalid {
+    Invalid(format!("expected {least} to {most}, found {found}"))
+}
+
+/// `expected` lists the lengths allowed, as in `1 or 3`.
+pub(super) fn wrong_count(expected: &str, found: usize) -> Invalid {
+    Invalid(format!("expected {expected} numbers, found {found}"))
+}
+
+/// The words between commas or white space.
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty())
+}
+
+/// What `read` makes of each word, of which there may be `most`.
+pub(super) fn at_most<'t, T>(
+    most: usize,
+    words: impl Iterator<Item = &'t str>,
+    read: impl Fn(&str) -> Result<T, Invalid>,
+) -> Result<Vec<T>, Invalid> {
+    let list = words.take(most + 1).map(read).collect::<Result<Vec<_>, _>>()?;
+    if list.len() > most { Err(Invalid(format!("expected at most {most} numbers, found more"))) } else { Ok(list) }
 }
 
 /// Finite numbers between commas or white space, at most [`MOST_NUMBERS`].
-pub(super) fn numbers(text: &str) -> Result<Vec<f64>, ValueError> {
-    let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
-    let list = words.take(MOST_NUMBERS + 1).map(number).collect::<Result<Vec<_>, _>>()?;
-    if list.len() > MOST_NUMBERS { Err(ValueError::TooManyNumbers { most: MOST_NUMBERS }) } else { Ok(list) }
+pub(super) fn numbers(text: &str) -> Result<Vec<f64>, Invalid> {
+    at_most(MOST_NUMBERS, words(text), number)
 }
 
 /// Three numbers, or one that stands for all three.
-pub(super) fn triple(text: &str) -> Result<[f64; 3], ValueError> {
+pub(super) fn triple(text: &str) -> Result<[f64; 3], Invalid> {
     match numbers(text)?[..] {
         [one] => Ok([one; 3]),
         [a, b, c] => Ok([a, b, c]),
-        ref other => Err(ValueError::Count { expected: "1 or 3", found: other.len() }),
+        ref other => Err(wrong_count("1 or 3", other.len())),
     }
 }
 
 /// The triple in the attribute `value` of an element, or in `x`, `y` and `z`, where an absent one counts as `missing`.
-pub(super) fn vector(element: &Element, missing: f64) -> Result<[f64; 3], ValueError> {
+pub(super) fn vector(element: &Element, missing: f64) -> Result<[f64; 3], Invalid> {
     if let Some(text) = element.attribute("value") {
         return triple(text);
     }
@@ -309,11 +330,11 @@ pub(super) fn vector(element: &Element, missing: f64) -> Result<[f64; 3], ValueE
     Ok([axis("x")?, axis("y")?, axis("z")?])
 }
 
-pub(super) fn boolean(text: &str) -> Result<bool, ValueError> {
+pub(super) fn boolean(text: &str) -> Result<bool, Invalid> {
     match text.trim().to_ascii_lowercase().as_str() {
         "true" => Ok(true),
         "false" => Ok(false),
-        other => Err(ValueError::NotABoolean { found: shortened(other) }),
+        other => Err(Invalid(format!("expected true or false, found '{}'", shortened(other)))),
     }
 }
 
@@ -321,27 +342,6 @@ pub(super) fn boolean(text: &str) -> Result<bool, ValueError> {
 const AFFINE: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 /// The largest deviation from [`AFFINE`] that counts as noise.
 const AFFINE_TOLERANCE: f64 = 1e-6;
-
-/// Why a step of a transform is not a matrix.
-#[derive(Debug, thiserror::Error)]
-enum StepError {
-    #[error(transparent)]
-    Value(#[from] ValueError),
-    #[error("{key}: {reason}")]
-    Point { key: &'static str, reason: ValueError },
-    #[error("expected {key}, found none")]
-    MissingPoint { key: &'static str },
-    #[error("expected matrix, translate, rotate, scale or lookat")]
-    UnknownStep,
-    #[error("expected a last row of 0 0 0 1, found a projection")]
-    Projection,
-    #[error("expected an axis, found a vector of length 0")]
-    NoAxis,
-    #[error("expected origin and target to differ")]
-    NoDirection,
-    #[error("expected an up vector that is not parallel to the direction of view")]
-    UpAlongView,
-}
 
 /// The product of a transform's steps, each applied after those before it. A transform with a faulty step gives none
 /// and is a finding with this `action`: without that step, it would put its object elsewhere.
@@ -372,7 +372,7 @@ pub(super) fn read_transform(transform: &Element, place: &str, action: &str, log
     None
 }
 
-fn step(element: &Element) -> Result<DMat4, StepError> {
+fn step(element: &Element) -> Result<DMat4, Invalid> {
     let vector = |missing| vector(element, missing).map(DVec3::from_array);
     match element.tag.as_str() {
         "matrix" => matrix(element.attribute("value").unwrap_or("")),
@@ -380,22 +380,24 @@ fn step(element: &Element) -> Result<DMat4, StepError> {
         "scale" => Ok(DMat4::from_scale(vector(1.0)?)),
         "rotate" => {
             let angle = number(element.attribute("angle").unwrap_or(""))?;
-            let axis = vector(0.0)?.try_normalize().ok_or(StepError::NoAxis)?;
+            let axis = vector(0.0)?
+                .try_normalize()
+                .ok_or_else(|| Invalid::new("expected an axis, found a vector of length 0"))?;
             Ok(DMat4::from_mat3(rotation(axis, angle.to_radians())))
         }
         "lookat" => look_at(element),
-        _ => Err(StepError::UnknownStep),
+        _ => Err(Invalid::new("expected matrix, translate, rotate, scale or lookat")),
     }
 }
 
 /// A row-major matrix of 16 numbers, or of 9 without translation.
-fn matrix(text: &str) -> Result<DMat4, StepError> {
+fn matrix(text: &str) -> Result<DMat4, Invalid> {
     let list = numbers(text)?;
     if let Ok(rows) = <[f64; 16]>::try_from(list.as_slice()) {
         // A matrix that was inverted elsewhere has noise in its last row.
         let miss = rows[12..].iter().zip(AFFINE).map(|(found, expected)| (found - expected).abs());
         if miss.fold(0.0, f64::max) > AFFINE_TOLERANCE {
-            return Err(StepError::Projection);
+            return Err(Invalid::new("expected a last row of 0 0 0 1, found a projection"));
         }
         let mut rows = rows;
         rows[12..].copy_from_slice(&AFFINE);
@@ -403,7 +405,7 @@ fn matrix(text: &str) -> Result<DMat4, StepError> {
     }
     match <[f64; 9]>::try_from(list.as_slice()) {
         Ok(rows) => Ok(DMat4::from_mat3(DMat3::from_cols_array(&rows).transpose())),
-        Err(_) => Err(ValueError::Count { expected: "16 or 9", found: list.len() }.into()),
+        Err(_) => Err(wrong_count("16 or 9", list.len())),
     }
 }
 
@@ -415,23 +417,25 @@ pub(super) fn rotation(axis: DVec3, angle: f64) -> DMat3 {
 }
 
 /// The transform from Mitsuba's camera space: +z towards the target, +y up, +x left.
-fn look_at(element: &Element) -> Result<DMat4, StepError> {
-    let given = |key| -> Result<Option<DVec3>, StepError> {
+fn look_at(element: &Element) -> Result<DMat4, Invalid> {
+    let given = |key| -> Result<Option<DVec3>, Invalid> {
         let Some(text) = element.attribute(key) else { return Ok(None) };
-        let list = numbers(text).map_err(|reason| StepError::Point { key, reason })?;
-        let count = ValueError::Count { expected: "3", found: list.len() };
-        let point = <[f64; 3]>::try_from(list).map_err(|_| StepError::Point { key, reason: count })?;
+        let point =
+            numbers(text).and_then(|list| <[f64; 3]>::try_from(list).map_err(|list| wrong_count("3", list.len())));
+        let point = point.map_err(|reason| Invalid(format!("{key}: {reason}")))?;
         Ok(Some(DVec3::from_array(point)))
     };
-    let needed = |key| given(key)?.ok_or(StepError::MissingPoint { key });
+    let needed = |key| given(key)?.ok_or_else(|| Invalid(format!("expected {key}, found none")));
     let (origin, target) = (needed("origin")?, needed("target")?);
-    let forward = (target - origin).try_normalize().ok_or(StepError::NoDirection)?;
+    let forward =
+        (target - origin).try_normalize().ok_or_else(|| Invalid::new("expected origin and target to differ"))?;
     let up = match given("up")? {
         Some(up) => up,
         None if forward.y.abs() < 0.999 => DVec3::Y,
         None => DVec3::Z,
     };
-    let left = up.cross(forward).try_normalize().ok_or(StepError::UpAlongView)?;
+    let parallel = || Invalid::new("expected an up vector that is not parallel to the direction of view");
+    let left = up.cross(forward).try_normalize().ok_or_else(parallel)?;
     let rotation = DMat3::from_cols(left, forward.cross(left), forward);
     Ok(DMat4::from_translation(origin) * DMat4::from_mat3(rotation))
 }

@@ -4,9 +4,10 @@ use glam::{DMat3, DMat4, DVec3};
 use mateval_dataset::{Camera, Intrinsics};
 use mateval_files::untrusted::shortened;
 
-use super::document::{BitterliError, Element, ValueError};
+use super::document::Element;
 use super::reader::{Parameters, Reader, number};
-use crate::source_scene::Log;
+use crate::log::Log;
+use crate::open::Invalid;
 
 /// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six
 /// digits.
@@ -25,7 +26,7 @@ struct Film {
 impl<'a> Reader<'a> {
     /// The camera of the sensor `element`. Fails where it is no perspective camera or its `to_world` is faulty or
     /// singular.
-    pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, BitterliError> {
+    pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, Invalid> {
         let mut from = self.parameters(element, element.place());
         match element.kind() {
             "perspective" => {}
@@ -38,11 +39,18 @@ impl<'a> Reader<'a> {
                     "used a pinhole camera, which sees everything sharp",
                 );
             }
-            other => return Err(BitterliError::OtherSensor { line: element.line, kind: shortened(other) }),
+            other => {
+                let (line, kind) = (element.line, shortened(other));
+                let expected = "expected 'perspective' (a pinhole camera)";
+                return Err(Invalid(format!("line {line}: the sensor '{kind}' is not supported; {expected}")));
+            }
         }
-        let world_from_sensor = from
-            .sound_transform("to_world", "there is no camera", &mut self.log)
-            .ok_or(BitterliError::SensorTransform { line: element.line })?;
+        let faulty = |expected: &str, found: &str| {
+            let line = element.line;
+            Invalid(format!("line {line}: expected {expected} to_world of the sensor, found {found}"))
+        };
+        let world_from_sensor = from.sound_transform("to_world", "there is no camera", &mut self.log);
+        let world_from_sensor = world_from_sensor.ok_or_else(|| faulty("a readable", "one with a faulty step"))?;
         let films = from.objects("film");
         let film = match films.first() {
             Some(film) => self.film(film),
@@ -55,7 +63,7 @@ impl<'a> Reader<'a> {
         from.ignore(&["near_clip", "far_clip", "shutter_open", "shutter_close", "focus_distance", "aperture_radius"]);
         from.finish(&mut self.log);
         let camera = camera(world_from_sensor, intrinsics(&film, fov_x, principal), &element.place(), &mut self.log);
-        camera.ok_or(BitterliError::SingularSensor { line: element.line })
+        camera.ok_or_else(|| faulty("an invertible", "a singular one"))
     }
 
     fn film(&mut self, element: &'a Element) -> Film {
@@ -78,12 +86,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The horizontal field of view in radians.
-    fn fov_x(
-        &mut self,
-        line: usize,
-        from: &mut Parameters<'a>,
-        [width, height]: [f64; 2],
-    ) -> Result<f64, BitterliError> {
+    fn fov_x(&mut self, line: usize, from: &mut Parameters<'a>, [width, height]: [f64; 2]) -> Result<f64, Invalid> {
         // The tangent of half the angle, and the axis along which it is measured.
         let axis = from.string("fov_axis").unwrap_or("x");
         let focal_length = from.string("focal_length");
@@ -98,7 +101,8 @@ impl<'a> Reader<'a> {
                     DEFAULT_FOCAL_LENGTH
                 });
                 // Mitsuba's convention: a film of 36 mm by 24 mm, measured along its diagonal.
-                let millimetres = millimetres(text).map_err(|reason| BitterliError::FocalLength { line, reason })?;
+                let faulty = |reason| Invalid(format!("line {line}: focal_length of the sensor: {reason}"));
+                let millimetres = millimetres(text).map_err(faulty)?;
                 ((36.0_f64 * 36.0 + 24.0 * 24.0).sqrt() / 2.0 / millimetres, "diagonal")
             }
         };
@@ -122,9 +126,9 @@ impl<'a> Reader<'a> {
 }
 
 /// A focal length as in `50mm`.
-fn millimetres(text: &str) -> Result<f64, ValueError> {
+fn millimetres(text: &str) -> Result<f64, Invalid> {
     let found = number(text.trim().trim_end_matches("mm"))?;
-    if found > 0.0 { Ok(found) } else { Err(ValueError::NotPositive { found }) }
+    if found > 0.0 { Ok(found) } else { Err(Invalid(format!("expected a number above 0, found {found}"))) }
 }
 
 /// Intrinsics of the crop window, from the field of view of the whole film.
@@ -172,7 +176,7 @@ mod tests {
             "<scene version='3.0.0'><sensor type='perspective'>{parameters}<film type='hdrfilm'>{film}</film></sensor></scene>"
         ));
         let scene = scene.unwrap();
-        (scene.camera, scene.findings.into_iter().map(|f| f.code).collect())
+        (scene.camera.unwrap(), scene.findings.into_iter().map(|f| f.code).collect())
     }
 
     fn fov_x_degrees(camera: &Camera) -> f64 {
@@ -237,7 +241,7 @@ mod tests {
         assert!((fov_x_degrees(&camera) - 42.311714).abs() < 1e-4);
         assert_eq!(findings, ["no_field_of_view"]);
         let four_to_three = "<scene version='3.0.0'><sensor type='perspective'/></scene>";
-        assert!((fov_x_degrees(&read_xml(four_to_three).unwrap().camera) - 38.18).abs() < 5e-3);
+        assert!((fov_x_degrees(&read_xml(four_to_three).unwrap().camera.unwrap()) - 38.18).abs() < 5e-3);
     }
 
     #[test]

@@ -229,7 +229,7 @@ impl<'a> Reader<'a> {
         }
         let path = self.source.path(&bitmap.file).ok();
         let alpha = path.and_then(|path| read_alpha(&path, bitmap.wrap).ok()).flatten();
-        let transparent = alpha.is_some_and(|alpha| !all_texels(&alpha, |value| value[0] == 1.0));
+        let transparent = alpha.is_some_and(|alpha| alpha.linear_texels().any(|value| value[0] != 1.0));
         self.alphas.insert(bitmap.file.clone(), transparent);
         transparent
     }
@@ -254,8 +254,7 @@ impl<'a> Reader<'a> {
     /// Adds a texture to the scene. It carries the hash of the file `name`, if that was read.
     pub(super) fn add_texture(&mut self, name: String, texture: Texture) -> TextureIndex {
         let sha256 = self.source.hash(&name);
-        self.scene.textures.push(SourceTexture { name, sha256, texture });
-        TextureIndex(self.scene.textures.len() - 1)
+        self.scene.add_texture(SourceTexture { name, sha256, texture })
     }
 
     fn load(&mut self, bitmap: &Bitmap, aspect: Aspect) -> Result<Texture, FileFault> {
@@ -298,23 +297,18 @@ impl<'a> Reader<'a> {
 const TEXTURE_LEFT_OUT: &str = "used linear mid-grey 0.5; as opacity or bump map, nothing";
 
 /// The luminance of a linear colour by Mitsuba's own weights, which have more digits than those of Rec. 709.
-pub(super) fn luminance(rgb: [f32; 3]) -> f32 {
+fn luminance(rgb: [f32; 3]) -> f32 {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
         return rgb[0];
     }
     0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2]
 }
 
-pub(super) fn all_texels(texture: &Texture, holds: impl Fn([f32; 3]) -> bool) -> bool {
-    (0..texture.height()).all(|y| (0..texture.width()).all(|x| holds(texture.texel(x, y))))
-}
-
 fn luminance_texture(texture: &Texture) -> Result<Texture, FileFault> {
     if matches!(texture.texels(), Texels::Grey(_) | Texels::Grey8(_)) {
         return Ok(texture.clone());
     }
-    let row = |y| (0..texture.width()).map(move |x| luminance(texture.texel(x, y)));
-    let values = (0..texture.height()).flat_map(row).collect();
+    let values = texture.linear_texels().map(luminance).collect();
     Texture::new(texture.width(), texture.height(), Texels::Grey(values), texture.wrap())
         .map_err(|error| FileFault { code: "unreadable_texture", message: error.to_string() })
 }

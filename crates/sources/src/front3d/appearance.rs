@@ -17,7 +17,8 @@ use mateval_image::{Texels, Texture, Wrap};
 use super::house::{House, HouseMaterial};
 use super::material_class::{AppearanceRule, BLOCK, Finish, drawn};
 use super::model::{Library, is_folder_name};
-use crate::source_scene::{Log, picture_fault};
+use crate::log::Log;
+use crate::source_scene::picture_fault;
 
 /// Linear mid-grey, which replaces a colour or texture that cannot be read.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
@@ -28,11 +29,10 @@ const ROUGHNESS: f32 = 0.5;
 const METALLIC: f32 = 0.0;
 
 /// The materials and textures made so far, each once.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Appearances {
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<SourceTexture>,
-    /// Texels of all textures.
     texels: usize,
     most_texels: usize,
     /// Where roughness and metallic come from.
@@ -41,7 +41,6 @@ pub(super) struct Appearances {
     known_textures: BTreeMap<String, Option<TextureIndex>>,
     /// By index in [`House::materials`] and by class.
     of_architecture: BTreeMap<(Option<usize>, Option<MaterialClass>), MaterialIndex>,
-    /// By model id.
     of_models: BTreeMap<String, MaterialIndex>,
     /// Number of materials that name a texture although no folder of textures was given.
     untextured: usize,
@@ -50,17 +49,7 @@ pub(super) struct Appearances {
 impl Appearances {
     /// No materials yet. All textures may have at most `most_texels` texels.
     pub(super) fn new(most_texels: usize, rule: AppearanceRule) -> Self {
-        Self {
-            materials: Vec::new(),
-            textures: Vec::new(),
-            texels: 0,
-            most_texels,
-            rule,
-            known_textures: BTreeMap::new(),
-            of_architecture: BTreeMap::new(),
-            of_models: BTreeMap::new(),
-            untextured: 0,
-        }
+        Self { most_texels, rule, ..Self::default() }
     }
 
     /// The material of a model, whose classes `finish` states, and whether its texture could be read.
@@ -195,19 +184,9 @@ impl Appearances {
     }
 
     fn add(&mut self, name: String, base_color: ColorInput, [roughness, metallic]: [ScalarInput; 2]) -> MaterialIndex {
-        self.materials.push(Material {
-            name,
-            model: MaterialModel::Principled {
-                base_color,
-                roughness,
-                metallic,
-                specular: 0.5,
-                flavour: PrincipledFlavour::Blender,
-            },
-            two_sided: true,
-            opacity: None,
-            bump: None,
-        });
+        let flavour = PrincipledFlavour::Blender;
+        let model = MaterialModel::Principled { base_color, roughness, metallic, specular: 0.5, flavour };
+        self.materials.push(Material::new(name, model));
         MaterialIndex(self.materials.len() - 1)
     }
 

@@ -135,9 +135,7 @@ pub struct SamplerRules {
     pub no_background: bool,
     /// The weight of walls, floors and the like in the score; other things weigh 1 or 10.
     pub architecture_weight: u32,
-    /// How the variety of what is seen enters the score.
     pub coverage: Coverage,
-    /// The least score of the input view.
     pub min_score: f64,
     /// The largest number of draws.
     pub tries: u32,

@@ -31,65 +31,28 @@ pub struct FoundCamera {
 }
 
 /// The rule that a draw breaks first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Refusal {
-    /// The first surface below the camera is not the room's floor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Refusal {
     OffFloor,
-    /// A view sees the outside.
     SeesOutside,
-    /// A view sees something nearer than allowed.
     TooNear,
-    /// The mean distance is out of range.
     MeanDistance,
-    /// The score is too low.
     LowScore,
-    /// Something is within the clearance.
     NoClearance,
 }
 
-/// How many draws broke each rule.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Refusals {
-    /// Draws with a surface other than the room's floor below the camera.
-    pub off_floor: u32,
-    /// Draws that see the outside.
-    pub sees_outside: u32,
-    /// Draws that see something nearer than allowed.
-    pub too_near: u32,
-    /// Draws whose mean distance is out of range.
-    pub mean_distance: u32,
-    /// Draws whose score is too low.
-    pub low_score: u32,
-    /// Draws with something within the clearance.
-    pub no_clearance: u32,
-}
-
-impl Refusals {
-    fn count(&mut self, refusal: Refusal) {
-        *match refusal {
-            Refusal::OffFloor => &mut self.off_floor,
-            Refusal::SeesOutside => &mut self.sees_outside,
-            Refusal::TooNear => &mut self.too_near,
-            Refusal::MeanDistance => &mut self.mean_distance,
-            Refusal::LowScore => &mut self.low_score,
-            Refusal::NoClearance => &mut self.no_clearance,
-        } += 1;
-    }
-
-    /// Each rule that was broken and how often, as in "3 see the outside, 2 are within 0.3 m of something".
-    fn counted(&self, rules: &SamplerRules) -> String {
-        let [nearest, farthest] = rules.mean_distance_m;
-        let rows = [
-            (self.off_floor, "are not above the room's floor".to_owned()),
-            (self.sees_outside, "see the outside".to_owned()),
-            (self.too_near, format!("see something nearer than {} m", rules.min_distance_m)),
-            (self.mean_distance, format!("have a mean distance outside {nearest} to {farthest} m")),
-            (self.low_score, format!("have a score below {}", rules.min_score)),
-            (self.no_clearance, format!("are within {} m of something", rules.clearance_m)),
-        ];
-        let broken = rows.into_iter().filter(|(count, _)| *count > 0);
-        broken.map(|(count, what)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
-    }
+/// How many draws broke each rule, as in "3 see the outside, 2 are within 0.3 m of something".
+fn counted(refusals: &BTreeMap<Refusal, u32>, rules: &SamplerRules) -> String {
+    let [nearest, farthest] = rules.mean_distance_m;
+    let counted = refusals.iter().map(|(refusal, count)| match refusal {
+        Refusal::OffFloor => format!("{count} are not above the room's floor"),
+        Refusal::SeesOutside => format!("{count} see the outside"),
+        Refusal::TooNear => format!("{count} see something nearer than {} m", rules.min_distance_m),
+        Refusal::MeanDistance => format!("{count} have a mean distance outside {nearest} to {farthest} m"),
+        Refusal::LowScore => format!("{count} have a score below {}", rules.min_score),
+        Refusal::NoClearance => format!("{count} are within {} m of something", rules.clearance_m),
+    });
+    counted.collect::<Vec<_>>().join(", ")
 }
 
 /// Why no camera can be drawn in a room.
@@ -100,9 +63,9 @@ pub enum CameraError {
     #[error(
         "none of {} cameras drawn in room '{room}' keeps the rules: {}; give a camera by hand, or try other rules or \
          another seed",
-        rules.tries, refusals.counted(rules)
+        rules.tries, counted(refusals, rules)
     )]
-    NoneFound { room: String, rules: Box<SamplerRules>, refusals: Refusals },
+    NoneFound { room: String, rules: Box<SamplerRules>, refusals: BTreeMap<Refusal, u32> },
 }
 
 /// A room made ready for drawing many cameras.
@@ -149,13 +112,13 @@ impl<'a> RoomSampler<'a> {
         rules: &SamplerRules,
         seed: u64,
     ) -> Result<FoundCamera, CameraError> {
-        let mut refusals = Refusals::default();
+        let mut refusals = BTreeMap::new();
         for number in 0..rules.tries {
             // Every draw follows from seed, room and number alone.
             let sampler = Sampler::new(seed, [self.room as u32, 0], number);
             match self.draw(&sampler, intrinsics, rules).and_then(|camera| self.judge(camera, turns, rules)) {
                 Ok(found) => return Ok(FoundCamera { tries: number + 1, ..found }),
-                Err(refusal) => refusals.count(refusal),
+                Err(refusal) => *refusals.entry(refusal).or_insert(0) += 1,
             }
         }
         let room = self.house.house.rooms[self.room].id.clone();
@@ -219,24 +182,22 @@ impl<'a> RoomSampler<'a> {
     /// The distance to the nearest surface that a dense grid of rays meets, since table edges and lamps fit between ten
     /// by ten rays. It is expensive and so checked late.
     fn nearest_by_dense_rays(&self, view: &Camera) -> f64 {
-        let met = grid(&view.intrinsics, DENSE_GRID).filter_map(|place| {
-            let hit = hit_through(self.world, view, place)?;
-            Some(view.camera_direction(place).length() * hit.depth)
-        });
-        met.fold(f64::INFINITY, f64::min)
+        let met = grid(&view.intrinsics, DENSE_GRID).filter_map(|place| self.met(view, place));
+        met.map(|(_, distance)| distance).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The surface that the ray through a place of the picture meets, and its distance.
+    fn met(&self, camera: &Camera, place: DVec2) -> Option<(usize, f64)> {
+        let hit: PixelHit = hit_through(self.world, camera, place)?;
+        Some((hit.surface.0, camera.camera_direction(place).length() * hit.depth))
     }
 
     /// The surfaces that ten by ten rays meet and their distances; none for a ray that leaves the house. Fails where a
     /// ray does and must not, and where all do.
     fn rays(&self, camera: &Camera, rules: &SamplerRules) -> Result<Vec<Option<(usize, f64)>>, Refusal> {
-        let met = |place: DVec2| {
-            let hit: PixelHit = hit_through(self.world, camera, place)?;
-            let distance = camera.camera_direction(place).length() * hit.depth;
-            Some((hit.surface.0, distance))
-        };
         let mut seen = Vec::new();
         for place in grid(&camera.intrinsics, GRID) {
-            let hit = met(place);
+            let hit = self.met(camera, place);
             if hit.is_none() && rules.no_background {
                 return Err(Refusal::SeesOutside);
             }

@@ -4,7 +4,7 @@
 use mateval_files::untrusted::{hint, without_mark};
 use serde_json::Value;
 
-use crate::source_scene::JsonSize;
+use crate::open::{Invalid, check_json};
 
 /// Limits on an untrusted house, checked before memory is taken. A house that exceeds them is refused; a model or
 /// texture that does is a finding.
@@ -16,11 +16,8 @@ pub struct Limits {
     pub json_values: usize,
     /// Lists and objects in the JSON, each of which takes more memory than a number.
     pub json_containers: usize,
-    /// Bytes of any other file.
     pub file_bytes: u64,
-    /// Triangles of all models and meshes.
     pub triangles: usize,
-    /// Texels of all textures.
     pub texels: usize,
     pub rooms: usize,
     /// Children of all rooms.
@@ -45,55 +42,17 @@ impl Default for Limits {
     }
 }
 
-/// Why JSON is not that of a 3D-FRONT house, or exceeds a limit.
-#[derive(Debug, thiserror::Error)]
-pub enum HouseError {
-    #[error("expected JSON: {reason}{hint}")]
-    NotJson {
-        reason: serde_json::Error,
-        /// What the file is instead, and what to do; empty where that is not known.
-        hint: String,
-    },
-    #[error("expected an object, found {found}")]
-    NotAnObject { found: &'static str },
-    /// The JSON holds more values than any file of the data.
-    #[error(
-        "expected at most {most_values} values and {most_containers} lists and objects, found {values} and {containers}"
-    )]
-    TooLarge { values: usize, containers: usize, most_values: usize, most_containers: usize },
-    #[error("expected an object 'scene' with rooms, found none")]
-    NoScene,
-    #[error("/scene/room: expected at most {most} rooms, found {found}")]
-    TooManyRooms { most: usize, found: usize },
-    #[error("{place}: expected at most {most} children in all rooms together, found more")]
-    TooManyChildren {
-        /// JSON pointer to the room at which the limit is exceeded.
-        place: String,
-        most: usize,
-    },
-    #[error("{place}: expected at most {most} triangles in all meshes together, found more")]
-    TooManyTriangles {
-        /// JSON pointer to the mesh at which the limit is exceeded.
-        place: String,
-        most: usize,
-    },
-}
-
 /// Parses an object. Fails where the text is not JSON, not an object, or exceeds `limits`.
-pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
+pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, Invalid> {
     let tree = parse_any(text, limits)?;
-    if tree.is_object() { Ok(tree) } else { Err(HouseError::NotAnObject { found: kind(&tree) }) }
+    if tree.is_object() { Ok(tree) } else { Err(Invalid(format!("expected an object, found {}", kind(&tree)))) }
 }
 
 /// Parses any JSON. Fails where the text is not JSON or exceeds `limits`.
-pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
+pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, Invalid> {
     let text = without_mark(text);
-    let JsonSize { values, containers } = JsonSize::of(text);
-    if values > limits.json_values || containers > limits.json_containers {
-        let (most_values, most_containers) = (limits.json_values, limits.json_containers);
-        return Err(HouseError::TooLarge { values, containers, most_values, most_containers });
-    }
-    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason, hint: hint(text).into_owned() })
+    check_json(text, limits.json_values, limits.json_containers)?;
+    serde_json::from_slice(text).map_err(|reason| Invalid(format!("expected JSON: {reason}{}", hint(text))))
 }
 
 /// The type of a value, for messages.
@@ -146,20 +105,21 @@ mod tests {
     #[test]
     fn large_json_is_refused_before_it_is_parsed() {
         assert!(parse(b"{\"a\": [1, 2, 3]}", &small()).is_ok());
-        let many_values = parse(b"{\"a\": [1,2,3,4,5,6,7,8,9,10,11]}", &small());
-        assert!(matches!(many_values, Err(HouseError::TooLarge { values: 11, containers: 2, .. })), "{many_values:?}");
-        let many_lists = parse(b"{\"a\": [[], [], []]}", &small()).unwrap_err();
-        assert!(many_lists.to_string().contains("at most 10 values and 3 lists"), "{many_lists}");
+        for (many, found) in [("[1,2,3,4,5,6,7,8,9,10,11]", "found 11 and 2"), ("[[], [], []]", "found 3 and 5")] {
+            let error = parse(format!("{{\"a\": {many}}}").as_bytes(), &small()).unwrap_err().to_string();
+            assert!(error.contains("at most 10 values and 3 lists") && error.contains(found), "{error}");
+        }
         // Brackets and commas within texts do not count.
         assert!(parse(br#"{"a": "[[[[[[{{{,,,,,,,,,,,,,,,, \" [[[ \\"}"#, &small()).is_ok());
     }
 
     #[test]
     fn other_texts_are_refused() {
-        assert!(matches!(parse(b"[]", &small()), Err(HouseError::NotAnObject { found: "a list" })));
-        assert!(matches!(parse(b"{", &small()), Err(HouseError::NotJson { .. })));
         let deep = "[".repeat(1000);
-        assert!(matches!(parse(deep.as_bytes(), &Limits::default()), Err(HouseError::NotJson { .. })));
+        for (text, words) in [("[]", "found a list"), ("{", "expected JSON"), (&deep, "expected JSON")] {
+            let error = parse(text.as_bytes(), &Limits::default()).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
     }
 
     #[test]

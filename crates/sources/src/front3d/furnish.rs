@@ -20,8 +20,9 @@ use super::house::{Child, ChildKind, DesignerCamera, House, shown_path, world_fr
 use super::material_class::{AppearanceRule, Finish, class_of_architecture, class_of_model};
 use super::model::{Kind, Library, Model, ModelInfo, is_folder_name};
 use super::{document, house, model};
-use crate::error::{InvalidSource, SourceError, open};
-use crate::source_scene::{InstanceOrigin, Log};
+use crate::log::Log;
+use crate::open::{SourceError, open};
+use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::{Repairs, parts_of_labels, to_world};
 use crate::{coincident, missing_uv};
 
@@ -140,9 +141,10 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     let mut looked_for = house_folder.into_files().renamed(|_| file.clone());
     [Some(models), texture_library].into_iter().flatten().for_each(|library| looked_for.extend(library.into_files()));
     looked_for.extend(LookedFor { hashes: hash.into_iter().collect(), absent: Vec::new() });
+    let world = world_from_house(files.blenderproc_compat);
     Ok(FurnishedHouse {
-        cameras: cameras.into_iter().map(|camera| mirrored(camera, files.blenderproc_compat)).collect(),
-        shift_m: world_from_house(files.blenderproc_compat).transform_vector3(house.shift_m),
+        cameras: cameras.into_iter().map(|camera| camera.moved(|at| world.transform_point3(at))).collect(),
+        shift_m: world.transform_vector3(house.shift_m),
         house,
         file,
         scene: Arc::new(scene),
@@ -166,13 +168,8 @@ fn read_json(path: &Path, limits: &Limits, log: &mut Log) -> Result<(House, Sour
     let (folder, _, bytes) = open(path, limits.json_bytes, limits.json_bytes)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let house = document::parse(&bytes, limits).and_then(|tree| house::read(&tree, &stem, limits, log));
-    let house = house.map_err(|error| SourceError::invalid(path, InvalidSource::House(error)))?;
+    let house = house.map_err(|invalid| invalid.in_file(path))?;
     Ok((house, folder))
-}
-
-fn mirrored(camera: DesignerCamera, compat: bool) -> DesignerCamera {
-    let place = |point: DVec3| world_from_house(compat).transform_point3(point);
-    DesignerCamera { position: place(camera.position), target: place(camera.target), ..camera }
 }
 
 fn library(files: &HouseFiles, path: &Path, limits: &Limits) -> Result<Library, SourceError> {
@@ -272,7 +269,7 @@ impl Furnisher<'_> {
         }
         let content = material.and_then(|material| self.house.materials[material].content.as_deref());
         let class = class_of_architecture(content, kind, &self.house.rooms[room].kind);
-        Some(Finish::uniform(class, 1 + parts.iter().max().copied().unwrap_or(0)))
+        Some(Finish::uniform(class, parts))
     }
 
     /// What the data states of a surface. It has no roughness and metallic; those of a rule are stated by the recipe.

@@ -10,10 +10,11 @@ use mateval_dataset::{Severity, TriangleMesh};
 use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
-use super::document::{HouseError, Limits, kind, list, number, numbers, parse, text};
+use super::document::{Limits, kind, list, number, numbers, parse, text};
 use super::house_mesh;
-use crate::error::{InvalidSource, SourceError, open};
-use crate::source_scene::{Log, report_shift, shift_of, shift_transform};
+use crate::log::Log;
+use crate::open::{Invalid, SourceError, open};
+use crate::source_scene::{report_shift, shift_of, shift_transform};
 
 /// The checked content of a house's JSON. V-Ray lights are left out, since their units are V-Ray's own.
 #[derive(Clone, Debug)]
@@ -21,10 +22,9 @@ pub struct House {
     /// Its uid, or the file's stem where it has none.
     pub uid: String,
     /// Records of furniture, including those that are not valid.
-    pub furniture: Vec<FurnitureRecord>,
-    pub meshes: Vec<HouseMesh>,
-    pub materials: Vec<HouseMaterial>,
-    /// Rooms, in the file's order.
+    pub(crate) furniture: Vec<FurnitureRecord>,
+    pub(crate) meshes: Vec<HouseMesh>,
+    pub(crate) materials: Vec<HouseMaterial>,
     pub rooms: Vec<Room>,
     /// The designers' cameras in the file.
     pub cameras: Vec<DesignerCamera>,
@@ -34,7 +34,7 @@ pub struct House {
 
 /// A record of furniture, to which children of rooms refer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FurnitureRecord {
+pub(crate) struct FurnitureRecord {
     /// The uid by which children refer to it.
     pub uid: String,
     /// The name of its model's folder.
@@ -49,7 +49,7 @@ pub struct FurnitureRecord {
 
 /// A mesh of the architecture, in the space of the child that refers to it.
 #[derive(Clone, Debug)]
-pub struct HouseMesh {
+pub(crate) struct HouseMesh {
     /// The uid by which children refer to it.
     pub uid: String,
     /// Its type, as in `WallInner`; `Other` where the file gives none.
@@ -65,7 +65,7 @@ pub struct HouseMesh {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct HouseMaterial {
+pub(crate) struct HouseMaterial {
     /// The uid by which meshes refer to it.
     pub uid: String,
     /// The name of its texture's folder; none where the colour counts.
@@ -87,15 +87,12 @@ pub struct Room {
     /// Its type, as in `LivingDiningRoom`.
     pub kind: String,
     /// The product of the scene's and the room's transforms, less the house's shift; the identity in every known file.
-    pub house_from_room: DMat4,
-    /// Its meshes and pieces of furniture.
-    pub children: Vec<Child>,
+    pub(crate) house_from_room: DMat4,
+    pub(crate) children: Vec<Child>,
 }
 
-/// A mesh or a piece of furniture in a room.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Child {
-    /// The record that it refers to.
+pub(crate) struct Child {
     pub what: ChildKind,
     pub placement: Placement,
     /// JSON pointer to the child.
@@ -104,7 +101,7 @@ pub struct Child {
 
 /// The record that a child refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChildKind {
+pub(crate) enum ChildKind {
     /// Index in [`House::furniture`].
     Furniture(usize),
     /// Index in [`House::meshes`].
@@ -114,7 +111,7 @@ pub enum ChildKind {
 /// Translation, rotation and scale of a child in its room, of a room in the scene, or of the scene in the house: a
 /// point v moves to `T * R * S * v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
+pub(crate) struct Placement {
     /// Metres.
     pub position: DVec3,
     /// Unit quaternion; the file's order is x, y, z, w.
@@ -124,8 +121,6 @@ pub struct Placement {
 }
 
 impl Placement {
-    pub const IDENTITY: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
-
     pub fn matrix(&self) -> DMat4 {
         DMat4::from_scale_rotation_translation(self.scale, self.rotation, self.position)
     }
@@ -143,23 +138,20 @@ pub(super) fn world_from_house(compat: bool) -> DMat4 {
     DMat4::from_scale(DVec3::new(1.0, 1.0, if compat { -1.0 } else { 1.0 }))
 }
 
-/// A camera that a designer set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignerCamera {
-    /// Its number in its file.
     pub number: usize,
-    /// Position in metres.
+    /// Metres.
     pub position: DVec3,
     /// A point in the middle of the picture, in metres.
     pub target: DVec3,
-    /// Vertical field of view in degrees.
     pub fov_y_deg: f64,
 }
 
 impl DesignerCamera {
-    /// The camera in a house from whose places `shift_m` is subtracted.
-    pub(super) fn shifted(self, shift_m: DVec3) -> Self {
-        Self { position: self.position - shift_m, target: self.target - shift_m, ..self }
+    /// The camera with both places moved.
+    pub(super) fn moved(self, place: impl Fn(DVec3) -> DVec3) -> Self {
+        Self { position: place(self.position), target: place(self.target), ..self }
     }
 }
 
@@ -171,7 +163,7 @@ impl House {
 }
 
 /// Reads the whole tree; `stem` is that of the file's name. Fails where it has no scene or exceeds `limits`.
-pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> Result<House, HouseError> {
+pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> Result<House, Invalid> {
     let materials = materials(tree, log);
     let material_of: BTreeMap<&str, usize> = materials.iter().enumerate().map(|(k, m)| (m.uid.as_str(), k)).collect();
     let meshes = meshes(tree, &material_of, limits, log)?;
@@ -183,7 +175,7 @@ pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> 
     rooms.iter_mut().for_each(|room| room.house_from_room = shift_transform(shift_m) * room.house_from_room);
     Ok(House {
         uid: text(tree, "uid").unwrap_or(stem).to_owned(),
-        cameras: snapshots(tree, log).into_iter().map(|camera| camera.shifted(shift_m)).collect(),
+        cameras: snapshots(tree, log).into_iter().map(|camera| camera.moved(|place| place - shift_m)).collect(),
         shift_m,
         furniture,
         meshes,
@@ -305,7 +297,7 @@ fn meshes(
     material_of: &BTreeMap<&str, usize>,
     limits: &Limits,
     log: &mut Log,
-) -> Result<Vec<HouseMesh>, HouseError> {
+) -> Result<Vec<HouseMesh>, Invalid> {
     let mut meshes = Vec::new();
     let mut triangles = 0;
     for (at, uid, record) in first_of_each_uid(tree, "mesh", log) {
@@ -313,7 +305,10 @@ fn meshes(
         let Some((mesh, base)) = house_mesh::read(record, &place, log) else { continue };
         triangles += mesh.triangles.len();
         if triangles > limits.triangles {
-            return Err(HouseError::TooManyTriangles { place, most: limits.triangles });
+            let most = limits.triangles;
+            return Err(Invalid(format!(
+                "{place}: expected at most {most} triangles in all meshes together, found more"
+            )));
         }
         let named = text(record, "material");
         let material = named.and_then(|uid| material_of.get(uid)).copied();
@@ -333,11 +328,15 @@ fn rooms(
     meshes: &[HouseMesh],
     limits: &Limits,
     log: &mut Log,
-) -> Result<Vec<Room>, HouseError> {
-    let scene = tree.get("scene").filter(|scene| scene.is_object()).ok_or(HouseError::NoScene)?;
+) -> Result<Vec<Room>, Invalid> {
+    let scene = tree
+        .get("scene")
+        .filter(|scene| scene.is_object())
+        .ok_or_else(|| Invalid::new("expected an object 'scene' with rooms, found none"))?;
     let found = list(scene, "room");
     if found.len() > limits.rooms {
-        return Err(HouseError::TooManyRooms { most: limits.rooms, found: found.len() });
+        let most = limits.rooms;
+        return Err(Invalid(format!("/scene/room: expected at most {most} rooms, found {}", found.len())));
     }
     // The records that children may refer to.
     let house_from_scene = placement(scene, "/scene", log).matrix();
@@ -353,7 +352,10 @@ fn rooms(
         let place = format!("/scene/room/{at}");
         child_count += list(record, "children").len();
         if child_count > limits.children {
-            return Err(HouseError::TooManyChildren { place, most: limits.children });
+            let most = limits.children;
+            return Err(Invalid(format!(
+                "{place}: expected at most {most} children in all rooms together, found more"
+            )));
         }
         let id = room_id(record, at, &rooms, &place, log);
         let children = list(record, "children").iter().enumerate();
@@ -494,10 +496,9 @@ pub(super) fn designer_cameras(
     let Some(beside) = beside else { return Ok((house.cameras.clone(), None)) };
     let path = root.join(beside);
     let (folder, _, bytes) = open(&path, limits.json_bytes, limits.json_bytes)?;
-    let invalid = |error| SourceError::invalid(&path, InvalidSource::House(error));
-    let tree = parse(&bytes, limits).map_err(invalid)?;
+    let tree = parse(&bytes, limits).map_err(|invalid| invalid.in_file(&path))?;
     let all = cameras_of(&tree, &house.uid);
-    let all: Vec<DesignerCamera> = all.into_iter().map(|camera| camera.shifted(house.shift_m)).collect();
+    let all: Vec<DesignerCamera> = all.into_iter().map(|camera| camera.moved(|place| place - house.shift_m)).collect();
     if all.is_empty() {
         let message = format!("expected cameras of the house '{}', found none", house.uid);
         let action = "used the cameras in the house's JSON";

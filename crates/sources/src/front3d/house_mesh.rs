@@ -6,7 +6,8 @@ use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
 use super::document::{kind, list, number};
-use crate::source_scene::{Log, shift_of};
+use crate::log::Log;
+use crate::source_scene::shift_of;
 use crate::surface_mesh::has_area;
 
 /// Coordinates beyond this many metres are faults.

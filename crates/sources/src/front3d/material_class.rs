@@ -61,142 +61,59 @@ pub(super) fn class_of_architecture(content: Option<&str>, kind: &str, room: &st
     })
 }
 
-struct ClassRow {
-    pub(super) class: MaterialClass,
-    /// Lower-case words that select the class, where the data's name contains one of them.
-    words: &'static [&'static str],
-    /// Least and most perceptual roughness.
-    pub(super) roughness: [f32; 2],
-    pub(super) metallic: f32,
-    /// Where the numbers come from.
-    #[cfg_attr(not(test), expect(dead_code, reason = "it documents the row, and a test requires it"))]
-    source: &'static str,
-}
+/// A class, lower-case words that select it where the data's name contains one of them, least and most perceptual
+/// roughness, and metallic.
+type ClassRow = (MaterialClass, &'static [&'static str], [f32; 2], f32);
 
-/// Every class. Words are compared row by row, so `rough cloth` is looked for before `cloth`, and `plywood` before
-/// `wood`.
+/// Every class, below the source of its numbers. Words are compared row by row, so `rough cloth` is looked for before
+/// `cloth`, and `plywood` before `wood`.
 const TABLE: [ClassRow; 15] = [
-    ClassRow {
-        class: MaterialClass::Glass,
-        words: &["glass"],
-        roughness: [0.05, 0.1],
-        metallic: 0.0,
-        source: "our choice: smooth but for what lets highlights of lamps be sampled; no chart that we read lists it",
-    },
-    ClassRow {
-        class: MaterialClass::Metal,
-        words: &["metal", "steel", "chrome", "iron", "brass", "copper", "gold"],
-        roughness: [0.2, 0.4],
-        metallic: 1.0,
-        source: "Roblox, Worn Metals: 0.2 to 0.4, metalness 1",
-    },
-    ClassRow {
-        class: MaterialClass::Stone,
-        words: &["marble", "stone", "granite"],
-        roughness: [0.1, 0.375],
-        metallic: 0.0,
-        source: "MaterialX, standard_surface_marble_solid: 0.1; Roblox, Marble: 0.375",
-    },
-    ClassRow {
-        class: MaterialClass::Tile,
-        words: &["tile", "ceramic", "porcelain"],
-        roughness: [0.1, 0.3],
-        metallic: 0.0,
-        source: "our choice: a glaze is glass, but less even; no chart that we may cite lists it",
-    },
-    ClassRow {
-        class: MaterialClass::SmoothLeather,
-        words: &["smooth leather"],
-        roughness: [0.2, 0.4],
-        metallic: 0.0,
-        source: "Roblox, Glossy Leather: 0.2 to 0.4",
-    },
-    ClassRow {
-        class: MaterialClass::Leather,
-        words: &["leather"],
-        roughness: [0.5, 0.7],
-        metallic: 0.0,
-        source: "Roblox, Worn Leather: 0.5 to 0.7",
-    },
-    ClassRow {
-        class: MaterialClass::Suede,
-        words: &["suede", "velvet"],
-        roughness: [0.6, 0.8],
-        metallic: 0.0,
-        source: "Roblox, Velvet, Suede: 0.6 to 0.8. Its metalness of 0.4 to 0.6 imitates sheen and is left out",
-    },
-    ClassRow {
-        class: MaterialClass::Wicker,
-        words: &["rattan", "bamboo", "wicker"],
-        roughness: [0.7, 0.9],
-        metallic: 0.0,
-        source: "Roblox, Worn Wood: 0.7 to 0.9",
-    },
-    ClassRow {
-        class: MaterialClass::CoarseCloth,
-        words: &["rough cloth", "carpet", "wool", "linen"],
-        roughness: [0.9, 0.96],
-        metallic: 0.0,
-        source: "Roblox, Wool, Linen: 0.9 to 0.96",
-    },
-    ClassRow {
-        class: MaterialClass::Cloth,
-        words: &["cloth", "fabric", "cushion", "pillow"],
-        roughness: [0.8, 0.9],
-        metallic: 0.0,
-        source: "Roblox, Cotton, Canvas, Denim: 0.8 to 0.9",
-    },
-    ClassRow {
-        class: MaterialClass::Paint,
-        words: &["paint", "wallpaper", "plaster"],
-        roughness: [0.6, 0.9],
-        metallic: 0.0,
-        source: "our choice: matt and silk emulsion, of which the charts above list none",
-    },
-    ClassRow {
-        class: MaterialClass::Lacquer,
-        words: &["lacquer"],
-        roughness: [0.3, 0.5],
-        metallic: 0.0,
-        source: "Roblox, Painted Metal: 0.3. Our choice: up to 0.5 for satin",
-    },
-    ClassRow {
-        class: MaterialClass::Board,
-        words: &["composite board", "plywood", "composition"],
-        roughness: [0.2, 0.4],
-        metallic: 0.0,
-        source: "Roblox, plastic: 0.1 (glossy) to 0.4 (matte). Our choice: without the high gloss, since faces are melamine",
-    },
-    ClassRow {
-        class: MaterialClass::Wood,
-        words: &["wood"],
-        roughness: [0.3, 0.7],
-        metallic: 0.0,
-        source: "Roblox: from the end of Glossy Wood (0.2 to 0.3) to the start of Worn Wood (0.7 to 0.9)",
-    },
-    ClassRow {
-        class: MaterialClass::Plastic,
-        words: &["plastic", "emissive"],
-        roughness: [0.1, 0.4],
-        metallic: 0.0,
-        source: "Roblox, Glossy Plastic: 0.1; Matte Plastic: 0.4",
-    },
+    // Our choice: smooth but for what lets highlights of lamps be sampled; no chart that we read lists it.
+    (MaterialClass::Glass, &["glass"], [0.05, 0.1], 0.0),
+    // Roblox, Worn Metals: 0.2 to 0.4, metalness 1.
+    (MaterialClass::Metal, &["metal", "steel", "chrome", "iron", "brass", "copper", "gold"], [0.2, 0.4], 1.0),
+    // MaterialX, standard_surface_marble_solid: 0.1; Roblox, Marble: 0.375.
+    (MaterialClass::Stone, &["marble", "stone", "granite"], [0.1, 0.375], 0.0),
+    // Our choice: a glaze is glass, but less even; no chart that we may cite lists it.
+    (MaterialClass::Tile, &["tile", "ceramic", "porcelain"], [0.1, 0.3], 0.0),
+    // Roblox, Glossy Leather: 0.2 to 0.4.
+    (MaterialClass::SmoothLeather, &["smooth leather"], [0.2, 0.4], 0.0),
+    // Roblox, Worn Leather: 0.5 to 0.7.
+    (MaterialClass::Leather, &["leather"], [0.5, 0.7], 0.0),
+    // Roblox, Velvet, Suede: 0.6 to 0.8. Its metalness of 0.4 to 0.6 imitates sheen and is left out.
+    (MaterialClass::Suede, &["suede", "velvet"], [0.6, 0.8], 0.0),
+    // Roblox, Worn Wood: 0.7 to 0.9.
+    (MaterialClass::Wicker, &["rattan", "bamboo", "wicker"], [0.7, 0.9], 0.0),
+    // Roblox, Wool, Linen: 0.9 to 0.96.
+    (MaterialClass::CoarseCloth, &["rough cloth", "carpet", "wool", "linen"], [0.9, 0.96], 0.0),
+    // Roblox, Cotton, Canvas, Denim: 0.8 to 0.9.
+    (MaterialClass::Cloth, &["cloth", "fabric", "cushion", "pillow"], [0.8, 0.9], 0.0),
+    // Our choice: matt and silk emulsion, of which the charts above list none.
+    (MaterialClass::Paint, &["paint", "wallpaper", "plaster"], [0.6, 0.9], 0.0),
+    // Roblox, Painted Metal: 0.3. Our choice: up to 0.5 for satin.
+    (MaterialClass::Lacquer, &["lacquer"], [0.3, 0.5], 0.0),
+    // Roblox, plastic: 0.1 (glossy) to 0.4 (matte). Our choice: without the high gloss, since faces are melamine.
+    (MaterialClass::Board, &["composite board", "plywood", "composition"], [0.2, 0.4], 0.0),
+    // Roblox: from the end of Glossy Wood (0.2 to 0.3) to the start of Worn Wood (0.7 to 0.9).
+    (MaterialClass::Wood, &["wood"], [0.3, 0.7], 0.0),
+    // Roblox, Glossy Plastic: 0.1; Matte Plastic: 0.4.
+    (MaterialClass::Plastic, &["plastic", "emissive"], [0.1, 0.4], 0.0),
 ];
 
 /// The first class of the table with a word that `name` contains.
 pub(super) fn class_named(name: &str) -> Option<MaterialClass> {
     let name = name.to_lowercase();
-    TABLE.iter().find(|row| row.words.iter().any(|word| name.contains(word))).map(|row| row.class)
+    TABLE.iter().find(|(_, words, ..)| words.iter().any(|word| name.contains(word))).map(|(class, ..)| *class)
 }
 
 /// Roughness and metallic of the material `id` of a class. The roughness is drawn from the class's range: it is the
 /// same for the same seed, id and class.
 pub(super) fn drawn(class: MaterialClass, id: &str, seed: u64) -> [f32; 2] {
-    let row = TABLE.iter().find(|row| row.class == class).expect("a test finds a row for every class");
+    let row = TABLE.iter().find(|(of, ..)| *of == class).expect("a test finds a row for every class");
     let hash = sha256_of_bytes(format!("{seed}/{id}/{class}").as_bytes());
     let bits = u32::from_str_radix(&hash[..6], 16).expect("a hash is hexadecimal");
-    let [low, high] = row.roughness;
-    [low + (high - low) * (bits as f32 / (1 << 24) as f32), row.metallic]
+    let (_, _, [low, high], metallic) = *row;
+    [low + (high - low) * (bits as f32 / (1 << 24) as f32), metallic]
 }
 
 /// Texels of a class's block. Lookups stay in the middle half of the block, so that all four texels of a bilinear
@@ -217,9 +134,10 @@ pub(super) struct Finish {
 }
 
 impl Finish {
-    /// One class for a surface of `parts` parts.
-    pub(super) fn uniform(class: MaterialClass, parts: usize) -> Self {
-        Self { classes: vec![class], uv: UvTransform::default(), of_parts: vec![Some(class); parts] }
+    /// One class for a surface; `parts` holds the part of each triangle.
+    pub(super) fn uniform(class: MaterialClass, parts: &[usize]) -> Self {
+        let of_parts = vec![Some(class); 1 + parts.iter().max().copied().unwrap_or(0)];
+        Self { classes: vec![class], uv: UvTransform::default(), of_parts }
     }
 
     /// The class `of_triangle` of each triangle, whose part is `parts`. Moves the uv of the mesh as the texture needs,
@@ -257,28 +175,21 @@ impl Finish {
 
 /// Adds `blocks[triangle] * step` to the u of every triangle's corners.
 fn shift(mesh: &mut TriangleMesh, blocks: &[usize], step: f32) {
-    let uvs = mesh.uvs.as_mut().expect("the caller has given the mesh uv");
     // The first block that uses a vertex keeps it, others get a copy.
     let mut owner: Vec<Option<usize>> = vec![None; mesh.positions.len()];
     let mut copies: BTreeMap<(u32, usize), u32> = BTreeMap::new();
-    for (triangle, block) in mesh.triangles.iter_mut().zip(blocks) {
-        for vertex in triangle {
-            let at = *vertex as usize;
-            if *owner[at].get_or_insert(*block) == *block {
-                continue;
+    for (triangle, &block) in blocks.iter().enumerate() {
+        for corner in 0..3 {
+            let vertex = mesh.triangles[triangle][corner];
+            if *owner[vertex as usize].get_or_insert(block) != block {
+                mesh.triangles[triangle][corner] = *copies.entry((vertex, block)).or_insert_with(|| {
+                    owner.push(Some(block));
+                    mesh.copy_vertex(vertex)
+                });
             }
-            *vertex = *copies.entry((*vertex, *block)).or_insert_with(|| {
-                mesh.positions.push(mesh.positions[at]);
-                uvs.push(uvs[at]);
-                if let Some(normals) = &mut mesh.normals {
-                    normals.push(normals[at]);
-                }
-                owner.push(Some(*block));
-                mesh.positions.len() as u32 - 1
-            });
         }
     }
-    for (uv, block) in uvs.iter_mut().zip(owner) {
+    for (uv, block) in mesh.uvs.iter_mut().flatten().zip(owner) {
         uv.x += step * block.unwrap_or(0) as f32;
     }
 }
@@ -290,17 +201,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_class_has_one_row_with_a_source_and_a_range() {
-        for class in MaterialClass::ALL {
-            let rows: Vec<&ClassRow> = TABLE.iter().filter(|row| row.class == class).collect();
-            let [row] = rows[..] else { panic!("{class}: {} rows", rows.len()) };
-            let is_cited = ["Roblox", "MaterialX"].iter().any(|name| row.source.contains(name));
-            assert!(is_cited || row.source.starts_with("our choice: "), "{class}: {}", row.source);
-            let [low, high] = row.roughness;
+    fn every_class_has_one_row_and_a_range() {
+        let mut classes: Vec<MaterialClass> = TABLE.iter().map(|(class, ..)| *class).collect();
+        classes.sort_unstable();
+        assert_eq!(classes, MaterialClass::ALL);
+        for (class, _, [low, high], metallic) in TABLE {
             assert!(0.0 < low && low < high && high <= 1.0, "{class}");
-            assert!(row.metallic == 0.0 || row.metallic == 1.0, "{class}");
+            assert!(metallic == 0.0 || metallic == 1.0, "{class}");
         }
-        assert_eq!(TABLE.len(), MaterialClass::ALL.len());
     }
 
     /// The materials of `model_info.json`, names of groups and content types of all known files.
@@ -412,7 +320,7 @@ mod tests {
     fn one_class_leaves_the_mesh_alone() {
         let mut mesh = square(None);
         let finish = Finish::laid_out(&mut mesh, &[MaterialClass::Wood; 2], &[0, 0]).unwrap();
-        assert_eq!(finish, Finish::uniform(MaterialClass::Wood, 1));
+        assert_eq!(finish, Finish::uniform(MaterialClass::Wood, &[0]));
         assert_eq!(mesh, square(None));
     }
 

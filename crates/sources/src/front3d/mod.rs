@@ -27,7 +27,7 @@ pub mod room_scene;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use document::{HouseError, Limits};
+pub use document::Limits;
 pub use furnish::{FurnishedHouse, HouseFiles, PlacedModel, PlacedSurface, furnish, read_house};
-pub use house::{Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Room};
+pub use house::{DesignerCamera, House, Room};
 pub use material_class::AppearanceRule;

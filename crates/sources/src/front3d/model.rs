@@ -18,7 +18,7 @@ use serde_json::Value;
 use super::document::{Limits, kind, parse_any, text};
 use super::house::FurnitureRecord;
 use super::material_class::{Finish, class_of_group};
-use crate::source_scene::Log;
+use crate::log::Log;
 use crate::surface_mesh::{has_area, labelled_parts, to_world};
 
 /// A model larger than this is taken to be in centimetres, since no furniture is ten metres long.
@@ -32,7 +32,6 @@ pub(super) struct Model {
     pub(super) part_of_triangle: Vec<usize>,
     /// The OBJ group of each triangle, as an index in `groups`.
     group_of_triangle: Vec<usize>,
-    /// The names of the OBJ groups.
     groups: Vec<String>,
     /// The classes of material, where [`Self::classified`] has found them.
     pub(super) finish: Option<Finish>,
@@ -47,7 +46,7 @@ impl Model {
         let finish = Finish::laid_out(&mut mesh, &of_triangles, &self.part_of_triangle).unwrap_or_else(|| {
             let message = "the texture coordinates spread too far for the classes of groups".to_owned();
             log.push(Severity::Note, "spread_uv", file, "", message, "gave all groups the class of the model");
-            Finish::uniform(class, 1 + self.part_of_triangle.iter().max().copied().unwrap_or(0))
+            Finish::uniform(class, &self.part_of_triangle)
         });
         self.mesh = Arc::new(mesh);
         self.finish = Some(finish);

@@ -164,36 +164,21 @@ const LAMP: f32 = 7.0;
 const WORLD_NAME: &str = "world";
 const WORLD: f32 = 0.05;
 
-/// Whether and how a surface emits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Glow {
-    No,
-    /// With this radiance. Ceilings of one room with equal radiance form one light group.
-    Ceiling([f32; 3]),
-    Lamp,
-}
-
-fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
-    let placed = &house.placed[surface];
-    match &placed.origin.role {
-        role if role.is_ceiling() => Glow::Ceiling(placed.color.map(|v| v * CEILING)),
-        Role::LightFixture {} => Glow::Lamp,
-        Role::Architecture { .. } | Role::Furniture {} | Role::Other {} => Glow::No,
-    }
-}
-
 /// The light groups of the house's surfaces `kept`, which are the surfaces of `scene` in this order. As in Blender,
 /// both sides emit.
 fn light_groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) -> Vec<LightGroup> {
     let mut groups: Vec<LightGroup> = Vec::new();
     let mut ceilings: Vec<((usize, [f32; 3]), usize)> = Vec::new();
     for (at, surface) in kept.iter().enumerate() {
-        let (radiance, map) = match glow(house, *surface) {
-            Glow::No | Glow::Ceiling(BLACK) => continue,
-            Glow::Lamp => lamp(scene, at),
+        let placed = &house.placed[*surface];
+        let (radiance, map) = match &placed.origin.role {
             // A ceiling joins the group of its room and radiance, if that exists.
-            Glow::Ceiling(radiance) => {
-                let key = (house.placed[*surface].room, radiance);
+            role if role.is_ceiling() => {
+                let radiance = placed.color.map(|v| v * CEILING);
+                if radiance == [0.0; 3] {
+                    continue;
+                }
+                let key = (placed.room, radiance);
                 let known = ceilings.iter().find(|(known, _)| *known == key).map(|(_, group)| *group);
                 if let Some(Emission::Area { surfaces, .. }) = known.map(|group| &mut groups[group].emission) {
                     surfaces.push(SurfaceIndex(at));
@@ -202,6 +187,8 @@ fn light_groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) 
                 ceilings.push((key, groups.len()));
                 (radiance, None)
             }
+            Role::LightFixture {} => lamp(scene, at),
+            Role::Architecture { .. } | Role::Furniture {} | Role::Other {} => continue,
         };
         let emission = Emission::Area { surfaces: vec![SurfaceIndex(at)], radiance, map, two_sided: true };
         groups.push(LightGroup { name: scene.surfaces[at].name.clone(), emission, camera_visible: false });
@@ -210,8 +197,6 @@ fn light_groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) 
     groups.push(LightGroup { name: WORLD_NAME.to_owned(), emission, camera_visible: true });
     groups
 }
-
-const BLACK: [f32; 3] = [0.0; 3];
 
 /// The emission of a lamp, whose base colour is the emission's map or factor.
 fn lamp(scene: &ReferenceScene, surface: usize) -> ([f32; 3], Option<EmissionMap>) {

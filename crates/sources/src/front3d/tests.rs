@@ -16,8 +16,10 @@ use mateval_dataset::reference::Surface;
 use mateval_dataset::{Role, Severity, TriangleMesh};
 use serde_json::{Value, json};
 
+use super::house::{Child, ChildKind, Placement};
 use super::*;
 use crate::SourceError;
+use crate::open::Invalid;
 use mateval_testkit::faulty_house;
 
 /// The house, below the folder that [`faulty_house::write`] fills.
@@ -65,7 +67,6 @@ impl Disk {
         self.folder.path().join("house/3D-FUTURE-model").join(jid(number))
     }
 
-    /// The house as it is on disk.
     fn furnish(&self) -> FurnishedHouse {
         furnish(&self.files(), &Limits::default()).unwrap()
     }
@@ -89,14 +90,23 @@ fn bare() -> &'static FurnishedHouse {
     HOUSE.get_or_init(|| Disk::bare().furnish())
 }
 
+/// The bare house as BlenderProc places it.
+fn compat() -> &'static FurnishedHouse {
+    static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
+    HOUSE.get_or_init(|| {
+        let disk = Disk::bare();
+        furnish(&HouseFiles { blenderproc_compat: true, ..disk.files() }, &Limits::default()).unwrap()
+    })
+}
+
 /// A model's id by the last digits.
 fn jid(number: u32) -> String {
     format!("cc0f0000-5a3b-4e00-8000-{number:012}")
 }
 
 /// A house read from JSON alone, and the findings.
-fn read_house(json: &Value) -> (Result<House, HouseError>, Vec<mateval_dataset::Finding>) {
-    let mut log = crate::source_scene::Log::new("house.json".into(), 5_000);
+fn read_house(json: &Value) -> (Result<House, Invalid>, Vec<mateval_dataset::Finding>) {
+    let mut log = crate::log::Log::new("house.json".into(), 5_000);
     let house = house::read(json, "stem", &Limits::default(), &mut log);
     (house, log.into_findings())
 }
@@ -113,6 +123,10 @@ fn pieces_of(house: &FurnishedHouse, room: usize, number: u32) -> Vec<&Surface> 
     let is_it =
         |placed: &PlacedSurface| placed.room == room && placed.model.as_ref().is_some_and(|model| model.jid == wanted);
     house.placed.iter().zip(&house.scene.surfaces).filter(|(placed, _)| is_it(placed)).map(|(_, s)| s).collect()
+}
+
+fn is_kind(placed: &PlacedSurface, kind: &str) -> bool {
+    placed.origin.role.architecture_kind() == Some(kind)
 }
 
 /// The box around a mesh's triangles.
@@ -186,24 +200,4 @@ fn lone_house(folder: &Path, text: &[u8]) -> HouseFiles {
         blenderproc_compat: false,
         appearance: AppearanceRule::Constant,
     }
-}
-
-/// The codes of the findings of a small house, in which the value at a JSON pointer is replaced.
-pub(crate) fn house_findings(pointer: &str, value: Value) -> Vec<String> {
-    let mut house = json!({
-        "uid": "small",
-        "material": [{ "uid": "m", "color": [200, 100, 50], "UVTransform": [1, 0, 0, 0, 1, 0, 0, 0, 1] }],
-        "mesh": [{
-            "uid": "wall", "type": "WallInner", "material": "m", "xyz": [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0],
-            "uv": [0, 0, 1, 0, 1, 1, 0, 1], "normal": [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1], "faces": [0, 1, 2, 0, 2, 3]
-        }],
-        "scene": { "room": [{
-            "instanceid": "Room-1", "type": "Room",
-            "children": [{ "ref": "wall", "instanceid": "mesh/1", "pos": [0, 0, 0], "rot": [0, 0, 0, 1], "scale": [1, 1, 1] }]
-        }] }
-    });
-    *house.pointer_mut(pointer).expect("the pointer exists") = value;
-    let mut log = crate::source_scene::Log::new("house.json".to_owned(), 100);
-    house::read(&house, "small", &Limits::default(), &mut log).unwrap();
-    log.into_findings().into_iter().map(|finding| finding.code).collect()
 }

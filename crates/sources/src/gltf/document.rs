@@ -2,15 +2,14 @@
 //! an unknown extension, by its own statement or because its meshes exist in a compressed form alone. Places are JSON
 //! pointers (RFC 6901).
 
-use gltf::json::validation;
-use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::gltf_file::{self, GltfFile, INSTANCING, json_of};
 use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_files::untrusted::{shortened, without_mark};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::source_scene::JsonSize;
+use crate::open::Invalid;
+use crate::open::check_json;
 
 /// Limits on an untrusted glTF, checked before memory is taken. The file is refused where its JSON or its buffers
 /// exceed them; anything else is left out, which is a finding.
@@ -29,7 +28,6 @@ pub struct Limits {
     pub triangles: usize,
     /// Vertices of all instances, counted like triangles.
     pub vertices: usize,
-    /// Texels of all textures.
     pub texels: usize,
     /// Number of lights. Each is rendered apart, so that the light of a view can be weighted anew.
     pub lights: usize,
@@ -51,73 +49,6 @@ impl Default for Limits {
             lights: 128,
             findings: 5_000,
         }
-    }
-}
-
-/// Why a file is not a glTF scene that can be read.
-#[derive(Debug, thiserror::Error)]
-pub enum GltfSceneError {
-    #[error(
-        "expected JSON of at most {most_bytes} bytes, {most_values} values and {most_containers} lists and objects, found \
-         {bytes}, {values} and {containers}"
-    )]
-    TooLarge {
-        bytes: usize,
-        values: usize,
-        containers: usize,
-        most_bytes: usize,
-        most_values: usize,
-        most_containers: usize,
-    },
-    /// The file cannot be read without an extension that is not supported, such as a compression of meshes.
-    #[error("/extensionsRequired: '{name}' is not supported; {way_out}")]
-    RequiredExtension { name: String, way_out: &'static str },
-    /// A mesh or a buffer view exists in a compressed form alone, which is not supported.
-    #[error("{pointer}: its data are compressed ('{name}'), which is not supported; {way_out}")]
-    OnlyCompressed { pointer: String, name: &'static str, way_out: &'static str },
-    /// The file breaks the rules of glTF.
-    #[error("{pointer}: {reason}{}", and_more(*others))]
-    NotValid {
-        /// The first place that breaks them.
-        pointer: String,
-        reason: validation::Error,
-        others: usize,
-    },
-    #[error(transparent)]
-    NotGltf(GltfError),
-    #[error("/scenes: expected a scene, found none")]
-    NoScene,
-    #[error("/buffers/{buffer}/uri: {reason}")]
-    Buffer { buffer: usize, reason: FileFault },
-    #[error("/buffers/{buffer}: expected a `uri`, or a .glb with a binary part")]
-    BufferWithoutData { buffer: usize },
-    #[error("/buffers: expected at most {most} bytes together, found more")]
-    BuffersTooLarge { most: u64 },
-}
-
-impl From<GltfError> for GltfSceneError {
-    fn from(error: GltfError) -> Self {
-        let GltfError::Unsound(gltf::Error::Validation(faults)) = &error else { return Self::NotGltf(error) };
-        match faults.first() {
-            Some((path, reason)) => {
-                let pointer = shortened(&pointer(path.as_str()));
-                Self::NotValid { pointer, reason: *reason, others: faults.len() - 1 }
-            }
-            None => Self::NotGltf(error),
-        }
-    }
-}
-
-/// A path of the gltf crate, as in `meshes[0].name`, as a JSON pointer: `/meshes/0/name`.
-fn pointer(path: &str) -> String {
-    format!("/{}", path.replace(['.', '['], "/").replace([']', '"'], ""))
-}
-
-fn and_more(others: usize) -> String {
-    match others {
-        0 => String::new(),
-        1 => ", and 1 more fault".to_owned(),
-        _ => format!(", and {others} more faults"),
     }
 }
 
@@ -160,23 +91,17 @@ struct Head {
 
 /// Parses a .gltf or .glb. Fails where it is not valid, exceeds `limits`, or requires an unknown extension.
 /// Whoever writes a compressed file must require the extension, unless the file holds the same meshes uncompressed.
-pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<GltfFile, GltfSceneError> {
+pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<GltfFile, Invalid> {
     let json = without_mark(json_of(bytes));
-    let JsonSize { values, containers } = JsonSize::of(json);
-    if json.len() > limits.json_bytes || values > limits.json_values || containers > limits.json_containers {
-        return Err(GltfSceneError::TooLarge {
-            bytes: json.len(),
-            values,
-            containers,
-            most_bytes: limits.json_bytes,
-            most_values: limits.json_values,
-            most_containers: limits.json_containers,
-        });
+    if json.len() > limits.json_bytes {
+        return Err(Invalid(format!("expected JSON of at most {} bytes, found {}", limits.json_bytes, json.len())));
     }
+    check_json(json, limits.json_values, limits.json_containers)?;
     // JSON that is not valid is reported by the parser of the whole.
     let required = serde_json::from_slice(json).map_or(Vec::new(), |head: Head| head.extensions_required);
     if let Some(name) = required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
-        return Err(GltfSceneError::RequiredExtension { name: shortened(name), way_out: way_out(name) });
+        let (name, way_out) = (shortened(name), way_out(name));
+        return Err(Invalid(format!("/extensionsRequired: '{name}' is not supported; {way_out}")));
     }
     let file = gltf_file::parse(bytes)?;
     check_compression(&file)?;
@@ -185,8 +110,11 @@ pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<GltfFile, GltfScene
 }
 
 /// Fails where a primitive or a buffer view has no data but compressed ones.
-fn check_compression(file: &GltfFile) -> Result<(), GltfSceneError> {
-    let only = |pointer, name| Err(GltfSceneError::OnlyCompressed { pointer, name, way_out: way_out(name) });
+fn check_compression(file: &GltfFile) -> Result<(), Invalid> {
+    let only = |pointer: String, name| {
+        let what = format!("its data are compressed ('{name}'), which is not supported; {}", way_out(name));
+        Err(Invalid(format!("{pointer}: {what}")))
+    };
     for mesh in file.document.meshes() {
         for primitive in mesh.primitives().filter(|primitive| primitive.extension_value(DRACO).is_some()) {
             // An accessor without a buffer view would read as zeros.
@@ -210,18 +138,14 @@ fn check_compression(file: &GltfFile) -> Result<(), GltfSceneError> {
 }
 
 /// Fails where an attribute of instances names an accessor that does not exist, as the gltf crate does for meshes.
-fn check_instances(document: &gltf::Document) -> Result<(), GltfSceneError> {
+fn check_instances(document: &gltf::Document) -> Result<(), Invalid> {
     let accessors = document.accessors().len() as u64;
     for node in document.nodes() {
         let attributes = node.extension_value(INSTANCING).and_then(|extension| extension.get("attributes"));
         for (name, index) in attributes.and_then(Value::as_object).into_iter().flatten() {
             if index.as_u64().is_none_or(|index| index >= accessors) {
                 let pointer = format!("/nodes/{}/extensions/{INSTANCING}/attributes/{}", node.index(), shortened(name));
-                return Err(GltfSceneError::NotValid {
-                    pointer,
-                    reason: validation::Error::IndexOutOfBounds,
-                    others: 0,
-                });
+                return Err(Invalid(format!("{pointer}: {}", gltf::json::validation::Error::IndexOutOfBounds)));
             }
         }
     }
@@ -233,21 +157,26 @@ pub(super) fn read_buffers(
     file: &mut GltfFile,
     folder: &mut SourceFolder,
     limits: &Limits,
-) -> Result<Vec<Vec<u8>>, GltfSceneError> {
+) -> Result<Vec<Vec<u8>>, Invalid> {
     let mut blob = file.blob.take();
     let mut buffers = Vec::new();
     let mut total = 0_u64;
     for buffer in file.document.buffers() {
         let number = buffer.index();
         let bytes = match buffer.source() {
-            gltf::buffer::Source::Bin => blob.take().ok_or(GltfSceneError::BufferWithoutData { buffer: number })?,
+            gltf::buffer::Source::Bin => blob
+                .take()
+                .ok_or_else(|| Invalid(format!("/buffers/{number}: expected a `uri`, or a .glb with a binary part")))?,
             gltf::buffer::Source::Uri(uri) => {
-                read_uri(uri, folder).map_err(|reason| GltfSceneError::Buffer { buffer: number, reason })?.0
+                read_uri(uri, folder).map_err(|fault| Invalid(format!("/buffers/{number}/uri: {fault}")))?.0
             }
         };
         total = total.saturating_add(bytes.len() as u64);
         if total > limits.file_bytes {
-            return Err(GltfSceneError::BuffersTooLarge { most: limits.file_bytes });
+            return Err(Invalid(format!(
+                "/buffers: expected at most {} bytes together, found more",
+                limits.file_bytes
+            )));
         }
         buffers.push(bytes);
     }

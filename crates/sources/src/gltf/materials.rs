@@ -5,16 +5,14 @@
 use gltf::material::{AlphaMode, PbrSpecularGlossiness};
 use mateval_dataset::material::{
     ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, StatedParameters,
-    TextureIndex,
 };
-use mateval_dataset::reference::{EmissionMap, MaterialIndex, SourceTexture};
+use mateval_dataset::reference::{EmissionMap, SourceTexture};
 use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::Encoding;
-use mateval_image::{Texels, Texture};
 
 use super::reader::{Glow, LEFT_OUT, Omission, ReadMaterial, Reader};
-use super::textures::{Lookup, wraps};
+use super::textures::{Lookup, grey, wraps};
 
 /// The index of refraction of `KHR_materials_ior` where the file states none.
 const DEFAULT_IOR: f32 = 1.5;
@@ -72,8 +70,7 @@ impl Reader<'_> {
         let glow = self.glow(material, &lookups, &pointer);
         let own_name = || material.index().map_or_else(|| "default".to_owned(), |index| format!("material {index}"));
         let name = material.name().map(shortened).unwrap_or_else(own_name);
-        self.scene.materials.push(Material { name, model, two_sided: true, opacity, bump: None });
-        let index = MaterialIndex(self.scene.materials.len() - 1);
+        let index = self.scene.add_material(Material { opacity, ..Material::new(name, model) });
         let stated = self.known(self.stated(material), material, &lookups, &pointer);
         let read = ReadMaterial { index, uv_set: lookups.set(), stated, glow };
         self.materials.insert(material.index(), read);
@@ -352,12 +349,8 @@ impl Reader<'_> {
         let Some(uv) = diffuse.or(specular).filter(|_| diffuse_texture.is_some() || specular_texture.is_some()) else {
             return without_textures;
         };
-        let grey = |alpha: &Texture| {
-            let texels = (0..alpha.height()).flat_map(|y| (0..alpha.width()).map(move |x| (x, y)));
-            let texels = texels.map(|(x, y)| alpha.texel(x, y)[0]).collect();
-            Texture::new(alpha.width(), alpha.height(), Texels::Grey(texels), alpha.wrap()).ok()
-        };
-        let glossiness = specular_texture.as_ref().and_then(|texture| grey(texture.alpha.as_ref()?));
+        let alpha = specular_texture.as_ref().and_then(|texture| texture.alpha.as_ref());
+        let glossiness = alpha.and_then(|alpha| grey(alpha, |texel| texel[0]).ok());
         let from = SpecularTextures {
             diffuse: diffuse_texture.as_ref().map(|decoded| &decoded.color),
             specular: specular_texture.as_ref().map(|decoded| &decoded.color),
@@ -365,8 +358,11 @@ impl Reader<'_> {
         };
         match textures(factors, from) {
             Ok([base, numbers]) => {
-                let base = self.computed(format!("{pointer} base colour"), base);
-                let numbers = self.computed(format!("{pointer} roughness and metallic"), numbers);
+                let mut add = |name, texture| {
+                    self.scene.add_texture(SourceTexture::computed(format!("{pointer} {name}"), texture))
+                };
+                let base = add("base colour", base);
+                let numbers = add("roughness and metallic", numbers);
                 let scalar = |channel| ScalarInput::Texture { texture: numbers, channel, uv: uv.uv };
                 (ColorInput::Texture { texture: base, uv: uv.uv }, [scalar(1), scalar(2)])
             }
@@ -375,10 +371,5 @@ impl Reader<'_> {
                 without_textures
             }
         }
-    }
-
-    fn computed(&mut self, name: String, texture: Texture) -> TextureIndex {
-        self.scene.textures.push(SourceTexture { name, sha256: None, texture });
-        TextureIndex(self.scene.textures.len() - 1)
     }
 }

@@ -1,6 +1,6 @@
 //! Reads any glTF 2.0 scene: .glb, or .gltf with its buffers and images in files beside it or in the JSON itself.
 //!
-//! The input is the path of the file; no file outside its folder is read. The output is a [`GltfScene`]: instances in
+//! The input is the path of the file; no file outside its folder is read. The output is a [`FileScene`]: instances in
 //! world space, their materials as Blender's principled model, lights, and the first perspective camera. Faulty parts
 //! of the file, and what a scene cannot represent, are left out or replaced and reported as findings, whose places are
 //! JSON pointers. An error means that there is no scene to read.
@@ -22,49 +22,27 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DVec3;
+use mateval_dataset::SceneLights;
 use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene};
-use mateval_dataset::{Camera, Finding, SceneLights};
 
-use crate::error::{InvalidSource, SourceError, open};
-use crate::source_scene::{InstanceOrigin, LicenceText, Log, UniqueNames, read_licence, report_shift, shift_of};
+use crate::log::{Log, UniqueNames};
+use crate::open::{Invalid, SourceError, open};
+use crate::source_scene::{FileScene, Missing, read_licence, report_shift, shift_of};
 use crate::{coincident, missing_uv};
-pub use document::{GltfSceneError, Limits};
+pub use document::Limits;
 use reader::{LEFT_OUT, Omission, Reader, report_omitted};
 
 /// The radiance from everywhere that lights a scene whose file has no light.
 const DEFAULT_RADIANCE: [f32; 3] = [1.0; 3];
-
-/// A scene of a glTF file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GltfScene {
-    /// Surfaces, materials, textures and lights, in world space.
-    pub scene: ReferenceScene,
-    /// Facts about each surface, in the order of `scene.surfaces`.
-    pub origins: Vec<InstanceOrigin>,
-    /// Whether the file has lights of its own.
-    pub lights: SceneLights,
-    /// The first perspective camera of the scene. glTF states no picture size; it has 480 columns.
-    pub camera: Option<Camera>,
-    /// What was subtracted from the file's positions, in metres.
-    pub shift_m: DVec3,
-    /// Everything that was left out, replaced or approximated; sorted.
-    pub findings: Vec<Finding>,
-    /// The licence file beside the glTF, if any.
-    pub licence: Option<LicenceText>,
-    /// Every file that was read, relative to the glTF's folder with forward slashes, and its SHA-256 in hex; sorted.
-    pub source_files: Vec<(String, String)>,
-    /// Every file that was looked for but is missing; sorted.
-    pub absent_files: Vec<String>,
-}
 
 /// Reads the default scene, or else the first scene, of the glTF at `path`. `camera` is the place of the camera that
 /// will be used instead of the file's own; it decides with that whether the scene is moved nearer to the origin.
 ///
 /// Fails where the file or one of its buffers cannot be read, the JSON is not valid glTF, breaks `limits` or requires
 /// an unknown extension, or the file has no scene.
-pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfScene, SourceError> {
+pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileScene, SourceError> {
     // The file and its buffers.
-    let invalid = |error| SourceError::invalid(path, InvalidSource::Gltf(error));
+    let invalid = |invalid: Invalid| invalid.in_file(path);
     let (mut source, name, bytes) = open(path, limits.file_bytes, limits.file_bytes)?;
     let mut file = document::parse(&bytes, limits).map_err(invalid)?;
     drop(bytes);
@@ -74,7 +52,7 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfS
     // The scene.
     let document = &file.document;
     let scene = document.default_scene().or_else(|| document.scenes().next());
-    let scene = scene.ok_or_else(|| invalid(GltfSceneError::NoScene))?;
+    let scene = scene.ok_or_else(|| invalid(Invalid::new("/scenes: expected a scene, found none")))?;
     let shift_m = shift_of(camera.or_else(|| nodes::place_of_camera(&scene)).unwrap_or(DVec3::ZERO));
     report_shift(shift_m, &mut log);
     let mut reader = Reader {
@@ -105,7 +83,7 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfS
     coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
     report_omitted(omitted, &mut log);
     let files = source.into_files();
-    Ok(GltfScene {
+    Ok(FileScene {
         scene,
         origins,
         lights,
@@ -113,8 +91,9 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfS
         shift_m,
         findings: log.into_findings(),
         licence,
-        source_files: files.hashes,
-        absent_files: files.absent,
+        missing: Missing::files(&files.hashes, &files.absent),
+        files: files.hashes,
+        absent: files.absent,
     })
 }
 

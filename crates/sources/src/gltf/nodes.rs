@@ -9,13 +9,13 @@ use gltf::mesh::Mode;
 use gltf::scene::Transform;
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::camera::{Camera, Intrinsics};
-use mateval_dataset::gltf_file::GltfError;
-use mateval_dataset::gltf_file::INSTANCING;
-use mateval_dataset::gltf_file::{indices, numbers};
+use mateval_dataset::gltf_file::{GltfError, INSTANCING, indices, numbers};
 use mateval_dataset::reference::{Emission, Surface, SurfaceIndex};
+use mateval_files::source_folder::FileFault;
 use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
+use super::document::Limits;
 use super::reader::{LEFT_OUT, Omission, ReadMaterial, Reader};
 use crate::source_scene::{InstanceOrigin, shift_transform};
 use crate::surface_mesh::{parts_of_labels, to_world};
@@ -63,44 +63,22 @@ impl Group {
     }
 }
 
-/// Why a primitive of a mesh is left out.
-#[derive(Debug, thiserror::Error)]
-enum PrimitiveFault {
-    /// An accessor cannot be read, or its content is not what is wanted.
-    #[error(transparent)]
-    Accessor(#[from] GltfError),
-    #[error("the scene has more than {triangles} triangles or {vertices} vertices")]
-    TooLarge { triangles: usize, vertices: usize },
-    #[error("points or lines")]
-    NotASurface,
-}
-
 impl Reader<'_> {
     /// Adds all nodes of a scene, moved by `-shift`. Returns its first perspective camera, in the order of the tree.
     pub(super) fn nodes(&mut self, scene: &gltf::Scene<'_>, shift: DVec3) -> Option<Camera> {
+        let (placed, repeated) = placed_nodes(scene, shift);
+        for index in repeated {
+            let message = "the node is the child of two nodes, or of itself";
+            self.log.warn("not_a_tree", &format!("/nodes/{index}"), message, "kept its first place");
+        }
         let mut camera = None;
-        let mut visited = BTreeSet::new();
-        let root = shift_transform(shift);
-        let mut open: Vec<(gltf::Node<'_>, DMat4)> = scene.nodes().map(|node| (node, root)).collect();
-        open.reverse();
-        while let Some((node, world_from_parent)) = open.pop() {
+        for PlacedNode { node, world_from_node, is_sound } in placed {
             let pointer = format!("/nodes/{}", node.index());
-            // A node has one parent. One that is reached twice may be part of a circle.
-            if !visited.insert(node.index()) {
-                let message = "the node is the child of two nodes, or of itself";
-                self.log.warn("not_a_tree", &pointer, message, "kept its first place");
-                continue;
-            }
-            let (parent_from_node, is_sound) = parent_from_node(&node);
             if !is_sound {
                 self.log.warn("bad_value", &pointer, "expected a rotation of length 1", "used no rotation");
             }
-            let world_from_node = world_from_parent * parent_from_node;
             self.node(&node, world_from_node, &pointer);
             camera = camera.or_else(|| self.camera(&node, world_from_node, &pointer));
-            let first = open.len();
-            open.extend(node.children().map(|child| (child, world_from_node)));
-            open[first..].reverse();
         }
         camera
     }
@@ -154,14 +132,13 @@ impl Reader<'_> {
         let all = ["TRANSLATION", "ROTATION", "SCALE"].map(attribute);
         let count = all.iter().flatten().map(gltf::Accessor::count).max().unwrap_or(0);
         if count == 0 {
-            return Err(GltfError::Missing { attribute: "TRANSLATION, ROTATION or SCALE of one instance or more" });
+            return Err(GltfError("expected TRANSLATION, ROTATION or SCALE of one instance or more".to_owned()));
         }
         if all.iter().flatten().any(|accessor| accessor.count() != count) {
-            return Err(GltfError::CountsDiffer);
+            return Err(GltfError("expected as many entries of TRANSLATION, ROTATION and SCALE".to_owned()));
         }
         if count > self.limits.primitives {
-            let accessor = all.iter().flatten().map(gltf::Accessor::index).next().unwrap_or(0);
-            return Err(GltfError::AccessorTooLarge { accessor, most: self.limits.primitives });
+            return Err(GltfError(format!("expected at most {} instances, found {count}", self.limits.primitives)));
         }
         let [translation, rotation, scale] = all;
         let translation = translation.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose()?;
@@ -202,6 +179,10 @@ impl Reader<'_> {
             self.primitives += 1;
             let material = primitive.material();
             let read = self.material(&material);
+            if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+                self.omit(Omission::Slight, "points and lines", LEFT_OUT, &pointer);
+                continue;
+            }
             match self.primitive(&primitive, read.uv_set, &pointer) {
                 Ok(mesh) => {
                     let at = groups.iter().position(|group| group.material == material.index());
@@ -213,19 +194,10 @@ impl Reader<'_> {
                     });
                     groups[at].add(&mesh, primitive.index());
                 }
-                Err(fault) => self.report_primitive(&fault, &pointer),
+                Err(fault) => self.log.warn(fault.code, &pointer, fault.message, "left the primitive out"),
             }
         }
         groups
-    }
-
-    fn report_primitive(&mut self, fault: &PrimitiveFault, pointer: &str) {
-        let code = match fault {
-            PrimitiveFault::Accessor(_) => "bad_mesh",
-            PrimitiveFault::TooLarge { .. } => "limit",
-            PrimitiveFault::NotASurface => return self.omit(Omission::Slight, "points and lines", LEFT_OUT, pointer),
-        };
-        self.log.warn(code, pointer, fault.to_string(), "left the primitive out");
     }
 
     /// Adds an instance, and its light if its material emits.
@@ -257,11 +229,10 @@ impl Reader<'_> {
         primitive: &gltf::Primitive<'_>,
         uv_set: Option<u32>,
         pointer: &str,
-    ) -> Result<TriangleMesh, PrimitiveFault> {
-        if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
-            return Err(PrimitiveFault::NotASurface);
-        }
-        let positions = primitive.get(&Semantic::Positions).ok_or(GltfError::Missing { attribute: "POSITION" })?;
+    ) -> Result<TriangleMesh, FileFault> {
+        let bad = |GltfError(message)| FileFault { code: "bad_mesh", message };
+        let missing = || bad(GltfError("expected POSITION".to_owned()));
+        let positions = primitive.get(&Semantic::Positions).ok_or_else(missing)?;
         let corner_numbers = primitive.indices();
         let corners = corner_numbers.as_ref().map_or(positions.count(), gltf::Accessor::count);
         self.count(positions.count(), corners, primitive.mode())?;
@@ -279,9 +250,10 @@ impl Reader<'_> {
         };
         let normals = same(Semantic::Normals, "NORMAL");
         let uvs = same(Semantic::TexCoords(uv_set.unwrap_or(0)), "TEXCOORD");
-        let positions = numbers::<3>(&positions, self.buffers)?.into_iter().map(Vec3::from_array).collect();
-        let normals = normals.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose()?;
-        let uvs = uvs.map(|accessor| numbers::<2>(&accessor, self.buffers)).transpose()?;
+        let positions =
+            numbers::<3>(&positions, self.buffers).map_err(bad)?.into_iter().map(Vec3::from_array).collect();
+        let normals = normals.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose().map_err(bad)?;
+        let uvs = uvs.map(|accessor| numbers::<2>(&accessor, self.buffers)).transpose().map_err(bad)?;
         let mesh = TriangleMesh {
             positions,
             normals: normals.map(|all| all.into_iter().map(Vec3::from_array).collect()),
@@ -291,7 +263,7 @@ impl Reader<'_> {
         };
         let vertices = mesh.positions.len();
         let numbers = match corner_numbers {
-            Some(accessor) => indices(&accessor, self.buffers)?,
+            Some(accessor) => indices(&accessor, self.buffers).map_err(bad)?,
             None => (0..vertices as u32).collect(),
         };
         let listed = listed(numbers, primitive.mode());
@@ -307,12 +279,14 @@ impl Reader<'_> {
     }
 
     /// Adds to the counts of vertices and triangles. Fails, without adding, where they would exceed the limits.
-    fn count(&mut self, vertices: usize, corners: usize, mode: Mode) -> Result<(), PrimitiveFault> {
+    fn count(&mut self, vertices: usize, corners: usize, mode: Mode) -> Result<(), FileFault> {
         let triangles = if mode == Mode::Triangles { corners / 3 } else { corners };
         let (all_vertices, all_triangles) =
             (self.vertices.saturating_add(vertices), self.triangles.saturating_add(triangles));
         if all_vertices > self.limits.vertices || all_triangles > self.limits.triangles {
-            return Err(PrimitiveFault::TooLarge { triangles: self.limits.triangles, vertices: self.limits.vertices });
+            let Limits { triangles, vertices, .. } = self.limits;
+            let message = format!("the scene has more than {triangles} triangles or {vertices} vertices");
+            return Err(FileFault { code: "limit", message });
         }
         (self.vertices, self.triangles) = (all_vertices, all_triangles);
         Ok(())
@@ -348,24 +322,39 @@ fn placed(translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3]) -> (DMat4,
     (DMat4::from_scale_rotation_translation(vector(scale), rotation, vector(translation)), is_sound)
 }
 
-/// The place of the scene's first camera that can be used, as [`Reader::nodes`] finds it.
-pub(super) fn place_of_camera(scene: &gltf::Scene<'_>) -> Option<DVec3> {
-    let mut visited = BTreeSet::new();
-    let mut open: Vec<(gltf::Node<'_>, DMat4)> = scene.nodes().map(|node| (node, DMat4::IDENTITY)).collect();
+struct PlacedNode<'f> {
+    node: gltf::Node<'f>,
+    world_from_node: DMat4,
+    /// Whether its rotation could be normalised; without, it has none.
+    is_sound: bool,
+}
+
+/// The nodes of a scene in the order of the tree, moved by `-shift`, and the indices of those that are reached again: a
+/// node has one parent, so these may be part of a circle.
+fn placed_nodes<'f>(scene: &gltf::Scene<'f>, shift: DVec3) -> (Vec<PlacedNode<'f>>, Vec<usize>) {
+    let (mut placed, mut repeated, mut visited) = (Vec::new(), Vec::new(), BTreeSet::new());
+    let root = shift_transform(shift);
+    let mut open: Vec<(gltf::Node<'f>, DMat4)> = scene.nodes().map(|node| (node, root)).collect();
     open.reverse();
     while let Some((node, world_from_parent)) = open.pop() {
         if !visited.insert(node.index()) {
+            repeated.push(node.index());
             continue;
         }
-        let world_from_node = world_from_parent * parent_from_node(&node).0;
-        if let Some(camera) = node.camera().and_then(|camera| perspective(&camera, world_from_node)) {
-            return Some(camera.position());
-        }
+        let (parent_from_node, is_sound) = parent_from_node(&node);
+        let world_from_node = world_from_parent * parent_from_node;
         let first = open.len();
         open.extend(node.children().map(|child| (child, world_from_node)));
         open[first..].reverse();
+        placed.push(PlacedNode { node, world_from_node, is_sound });
     }
-    None
+    (placed, repeated)
+}
+
+/// The place of the scene's first camera that can be used, as [`Reader::nodes`] finds it.
+pub(super) fn place_of_camera(scene: &gltf::Scene<'_>) -> Option<DVec3> {
+    let (placed, _) = placed_nodes(scene, DVec3::ZERO);
+    placed.iter().find_map(|placed| Some(perspective(&placed.node.camera()?, placed.world_from_node)?.position()))
 }
 
 /// The node's name, else its mesh's, else its number.

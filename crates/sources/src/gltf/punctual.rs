@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3};
 use gltf::khr_lights_punctual::{Kind, Light};
-use mateval_dataset::material::{ColorInput, Material, MaterialModel, TextureIndex};
+use mateval_dataset::material::{Material, MaterialModel, TextureIndex};
 use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, SourceTexture, Surface, SurfaceIndex};
 use mateval_dataset::{Role, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
@@ -84,12 +84,8 @@ impl Reader<'_> {
         }
     }
 
-    /// A material that light passes unchanged. It has no base colour, so it is not predicted.
     fn clear_material(&mut self) -> MaterialIndex {
-        let white = ColorInput::Constant([1.0; 3]);
-        let model =
-            MaterialModel::ThinDielectric { eta: 1.0, specular_reflectance: white, specular_transmittance: white };
-        let clear = Material { name: "light".to_owned(), model, two_sided: true, opacity: None, bump: None };
+        let clear = Material::new("light", MaterialModel::clear());
         // The last material is that of the lamp before, if any.
         if self.scene.materials.last() != Some(&clear) {
             self.scene.materials.push(clear);
@@ -137,8 +133,7 @@ impl Reader<'_> {
         if !self.add_light(SUN, emission, false, pointer) {
             return None;
         }
-        self.scene.textures.push(SourceTexture { name: SUN.to_owned(), sha256: None, texture: map });
-        Some(texture)
+        Some(self.scene.add_texture(SourceTexture::computed(SUN, map)))
     }
 }
 

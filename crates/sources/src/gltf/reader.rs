@@ -10,7 +10,8 @@ use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::shortened;
 
 use super::document::Limits;
-use crate::source_scene::{InstanceOrigin, Log, UniqueNames};
+use crate::log::{Log, UniqueNames};
+use crate::source_scene::InstanceOrigin;
 
 pub(super) struct Reader<'a> {
     pub(super) file: &'a GltfFile,
@@ -21,7 +22,6 @@ pub(super) struct Reader<'a> {
     pub(super) omitted: BTreeMap<(Omission, String), Occurrences>,
     pub(super) source: SourceFolder,
     pub(super) scene: ReferenceScene,
-    /// Facts about each surface.
     pub(super) origins: Vec<InstanceOrigin>,
     /// Every texture looked up so far. None stands for one that could not be used, which has been reported.
     pub(super) textures: BTreeMap<TextureKey, Option<TextureIndex>>,
@@ -29,7 +29,6 @@ pub(super) struct Reader<'a> {
     pub(super) faulty_images: BTreeSet<usize>,
     /// JSON pointers to references to textures without a picture.
     pub(super) without_picture: BTreeSet<&'a str>,
-    /// Texels of all textures.
     pub(super) texels: usize,
     /// By index in the file; none for the material of primitives without one.
     pub(super) materials: BTreeMap<Option<usize>, ReadMaterial>,
@@ -85,7 +84,6 @@ pub(super) struct ReadMaterial {
 pub(super) struct Glow {
     /// Linear Rec. 709 radiance.
     pub(super) radiance: [f32; 3],
-    /// The texture that multiplies it.
     pub(super) map: Option<EmissionMap>,
     pub(super) two_sided: bool,
 }

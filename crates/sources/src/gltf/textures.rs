@@ -175,10 +175,7 @@ impl Reader<'_> {
             Ok(SourceTexture { name, sha256: Some(sha256), texture })
         });
         match loaded {
-            Ok(texture) => {
-                self.scene.textures.push(texture);
-                Some(TextureIndex(self.scene.textures.len() - 1))
-            }
+            Ok(texture) => Some(self.scene.add_texture(texture)),
             Err(fault) => {
                 self.report_image(image, fault);
                 None
@@ -241,13 +238,13 @@ fn scaled(texture: Texture, factor: [f32; 3]) -> Result<Texture, ImageError> {
     if factor == [1.0; 3] {
         return Ok(texture);
     }
-    let texels = all_texels(&texture).map(|texel| std::array::from_fn(|channel| texel[channel] * factor[channel]));
+    let texels = texture.linear_texels().map(|texel| std::array::from_fn(|channel| texel[channel] * factor[channel]));
     Texture::new(texture.width(), texture.height(), Texels::Linear(texels.collect()), texture.wrap())
 }
 
 /// A texture of one number a texel.
-fn grey(texture: &Texture, value: impl Fn([f32; 3]) -> f32) -> Result<Texture, ImageError> {
-    let texels = all_texels(texture).map(value).collect();
+pub(super) fn grey(texture: &Texture, value: impl Fn([f32; 3]) -> f32) -> Result<Texture, ImageError> {
+    let texels = texture.linear_texels().map(value).collect();
     Texture::new(texture.width(), texture.height(), Texels::Grey(texels), texture.wrap())
 }
 
@@ -258,11 +255,6 @@ fn opacity(alpha: Option<Texture>, wrap: Wrap, value: impl Fn(f32) -> f32) -> Re
         Some(alpha) => Ok(grey(&alpha, |texel| value(texel[0]))?.collapsed()),
         None => Texture::new(1, 1, Texels::Grey(vec![value(1.0)]), wrap),
     }
-}
-
-/// All texels, row by row.
-fn all_texels(texture: &Texture) -> impl Iterator<Item = [f32; 3]> + '_ {
-    (0..texture.height()).flat_map(move |y| (0..texture.width()).map(move |x| texture.texel(x, y)))
 }
 
 #[cfg(test)]

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use exr::prelude as ex;
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::mesh::UvAtlas;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::{Map, instance_folder};
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_dataset::{Finding, Severity, TriangleMesh, glb};
 use mateval_image::exr_io::{Precision, write_linear, write_scalar};
 use mateval_image::texture_io::{Encoding, read_texture};

@@ -89,14 +89,14 @@ impl Known {
 /// Fails unless every constant is finite, every index of refraction above 0, and every texture and channel exist.
 fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
     let inputs = material.model.inputs();
-    for eta in inputs.etas {
+    if let Some(eta) = inputs.eta {
         if !(eta.is_finite() && eta > 0.0) {
             return Err(MaterialFault::IndexOfRefraction(eta));
         }
     }
-    inputs.colors.into_iter().try_for_each(|color| check_color(color, textures))?;
-    inputs.scalars.into_iter().try_for_each(|scalar| check_scalar(scalar, textures))?;
-    inputs.numbers.into_iter().try_for_each(check_number)?;
+    inputs.colors.iter().try_for_each(|color| check_color(color, textures))?;
+    inputs.scalars.iter().try_for_each(|scalar| check_scalar(scalar, textures))?;
+    inputs.specular.into_iter().try_for_each(check_number)?;
     material.opacity.iter().try_for_each(|opacity| check_scalar(opacity, textures))?;
     match &material.bump {
         Some(bump) => check_scalar(&bump.height, textures).and_then(|()| check_number(bump.scale)),

@@ -155,10 +155,8 @@ fn stated(files: HouseFiles, seed: u64) -> FurnishedHouse {
 
 /// The small house with two copies of a model of the groups above, which `model_info.json` says is of marble.
 fn tables(folder: &Path, obj: &str) -> HouseFiles {
-    let mut json = small_house();
-    json["furniture"] = json!([{"uid": "p", "jid": "x", "valid": true}]);
+    let mut json = with_piece("x");
     let children = json["scene"]["room"][0]["children"].as_array_mut().unwrap();
-    children.push(json!({"ref": "p", "instanceid": "furniture/1", "pos": [2, 0, 2]}));
     children.push(json!({"ref": "p", "instanceid": "furniture/2", "pos": [1, 0, 1]}));
     let files = lone_house(folder, json.to_string().as_bytes());
     std::fs::create_dir(folder.join("models/x")).unwrap();

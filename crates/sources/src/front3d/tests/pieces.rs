@@ -5,7 +5,7 @@ use mateval_dataset::material::{ColorInput, Material, MaterialModel, UvTransform
 use mateval_files::source_folder::SourceFolder;
 
 use super::*;
-use crate::source_scene::Log;
+use crate::log::Log;
 
 const GREY: ColorInput = ColorInput::Constant([0.5; 3]);
 
@@ -260,14 +260,6 @@ fn each_material_rule_alone() {
     }
 }
 
-/// The whole matrix is applied, including its translation: the lookup reads a texel a quarter further on.
-#[test]
-fn uv_transforms_move_too() {
-    let uv = UvTransform([[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]);
-    let place = uv.apply(glam::Vec2::new(0.5, 1.0));
-    assert!((place - glam::Vec2::new(1.25, -2.5)).length() < 1e-6, "{place}");
-}
-
 /// Without the folder of textures the architecture has its colours, which one finding reports.
 #[test]
 fn textures_may_be_missing_altogether() {
@@ -279,23 +271,23 @@ fn textures_may_be_missing_altogether() {
     assert_eq!(messages, ["7 materials have a texture, but no folder of textures was given"]);
     assert_sound(&house);
     // The twin: with the folder there is no such finding.
-    let house = furnish(&disk.files(), &Limits::default()).unwrap();
-    assert!(house.findings.iter().all(|finding| finding.code != "no_textures"));
+    assert!(furnished().findings.iter().all(|finding| finding.code != "no_textures"));
 }
 
 /// The white of a material whose texture is lost is no statement, unless the maker has no textures at all.
 #[test]
 fn a_lost_texture_leaves_the_color_unstated() {
     let disk = Disk::new();
-    let unstated = |textures: Option<&str>| {
-        let files = HouseFiles { textures: textures.map(Into::into), ..disk.files() };
-        let house = furnish(&files, &Limits::default()).unwrap();
+    let unstated_in = |house: &FurnishedHouse| {
         house.placed.iter().filter(|placed| placed.model.is_none() && !placed.origin.stated.base_color).count()
     };
-    let sound = unstated(disk.files().textures.as_deref().and_then(std::path::Path::to_str));
+    let unstated = |textures: Option<PathBuf>| {
+        unstated_in(&furnish(&HouseFiles { textures, ..disk.files() }, &Limits::default()).unwrap())
+    };
+    let sound = unstated_in(furnished());
     assert!(unstated(None) <= sound);
     std::fs::create_dir(disk.files().root.join("house/empty")).unwrap();
-    assert!(unstated(Some("house/empty")) > sound);
+    assert!(unstated(Some("house/empty".into())) > sound);
 }
 
 /// The linear map that takes one list of points to another, by least squares about their middles.
@@ -363,35 +355,30 @@ fn compat_is_blenderprocs_matrix() {
 /// BlenderProc's pictures.
 #[test]
 fn compat_mirrors_the_architecture_and_not_the_sofa() {
-    let disk = Disk::bare();
-    let normal = disk.furnish();
-    let compat = furnish(&HouseFiles { blenderproc_compat: true, ..disk.files() }, &Limits::default()).unwrap();
-    assert_sound(&compat);
+    let (disk, normal, compat) = (Disk::bare(), bare(), compat());
+    assert_sound(compat);
     let folder = SourceFolder::new(&disk.folder.path().join("house/3D-FUTURE-model"), 1 << 30).unwrap();
     let mut library = model::Library { folder, name: String::new() };
     let source = model::read(&jid(1), &mut library, &Limits::default(), &mut Log::new("h".into(), 10)).unwrap().mesh;
     let sofa = |house| &pieces_of(house, LIVING, 1)[0].mesh;
-    let wall = |house: &FurnishedHouse| {
-        let at = house
-            .placed
-            .iter()
-            .position(|p| p.room == LIVING && p.origin.role.architecture_kind() == Some("WallInner"));
-        house.scene.surfaces[at.unwrap()].mesh.clone()
+    let wall = |house: &'static FurnishedHouse| {
+        let at = house.placed.iter().position(|p| p.room == LIVING && is_kind(p, "WallInner"));
+        &house.scene.surfaces[at.unwrap()].mesh
     };
 
     // The sofa relative to its source: half a turn; with compat half a turn, M_z and the mirror of its own x.
     assert_near(
-        linear_map(&source.positions, &sofa(&normal).positions),
+        linear_map(&source.positions, &sofa(normal).positions),
         DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)),
     );
-    assert_near(linear_map(&source.positions, &sofa(&compat).positions), DMat3::IDENTITY);
+    assert_near(linear_map(&source.positions, &sofa(compat).positions), DMat3::IDENTITY);
     // The architecture: M_z.
     assert_near(
-        linear_map(&wall(&normal).positions, &wall(&compat).positions),
+        linear_map(&wall(normal).positions, &wall(compat).positions),
         DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)),
     );
     // Both face outwards, and nothing else changed.
-    let volumes = [sofa(&normal), sofa(&compat)].map(signed_volume);
+    let volumes = [sofa(normal), sofa(compat)].map(signed_volume);
     assert!((volumes[0] - volumes[1]).abs() < 1e-4 && volumes[0] > 0.0, "{volumes:?}");
 
     // The long seat is where the sofa extends far from the north wall; its x in the room is compared.
@@ -402,7 +389,7 @@ fn compat_mirrors_the_architecture_and_not_the_sofa() {
         at_front.iter().sum::<f32>() / at_front.len() as f32 - (low.x + high.x) / 2.0
     };
     // It faces north: its front is at the smallest z, and at the largest if mirrored.
-    let (one, other) = (long_seat(sofa(&normal), -1.0), long_seat(sofa(&compat), 1.0));
+    let (one, other) = (long_seat(sofa(normal), -1.0), long_seat(sofa(compat), 1.0));
     assert!(one < -0.5 && other > 0.5, "{one} {other}");
     assert!((one + other).abs() < 1e-3);
 }
@@ -410,10 +397,8 @@ fn compat_mirrors_the_architecture_and_not_the_sofa() {
 /// The designers' cameras are mirrored with the architecture, so that they see the same walls.
 #[test]
 fn compat_mirrors_cameras_too() {
-    let disk = Disk::bare();
-    let compat = furnish(&HouseFiles { blenderproc_compat: true, ..disk.files() }, &Limits::default()).unwrap();
-    assert_eq!(compat.cameras.len(), 6);
-    for (one, other) in bare().cameras.iter().zip(&compat.cameras) {
+    assert_eq!(compat().cameras.len(), 6);
+    for (one, other) in bare().cameras.iter().zip(&compat().cameras) {
         assert_eq!(
             (one.position.x, one.position.y, one.position.z),
             (other.position.x, other.position.y, -other.position.z)

@@ -31,22 +31,8 @@ fn is_furniture(placed: &PlacedSurface) -> bool {
     placed.origin.role.is_furniture()
 }
 
-/// Metres along y: the lowest and the highest of a surface's triangles.
-fn heights(house: &FurnishedHouse, surface: usize) -> [f32; 2] {
-    let mesh = &house.scene.surfaces[surface].mesh;
-    let all = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize].y);
-    [all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max)]
-}
-
-/// Whether a piece may stand on another: their boxes overlap in plan.
-fn is_above(house: &FurnishedHouse, surface: usize, other: usize) -> bool {
-    let plan = |at: usize| {
-        let mesh = &house.scene.surfaces[at].mesh;
-        let all = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]);
-        [all().reduce(glam::Vec3::min).unwrap(), all().reduce(glam::Vec3::max).unwrap()]
-    };
-    let ([low, high], [other_low, other_high]) = (plan(surface), plan(other));
-    low.x < other_high.x && other_low.x < high.x && low.z < other_high.z && other_low.z < high.z
+fn box_of(house: &FurnishedHouse, surface: usize) -> [Vec3; 2] {
+    bounds(&house.scene.surfaces[surface].mesh)
 }
 
 fn assert_house(house: &FurnishedHouse, pieces: usize, cameras: usize) {
@@ -88,16 +74,14 @@ fn assert_stands(house: &FurnishedHouse, surface: usize) {
     if !is_furniture(placed) || hangs(placed) {
         return;
     }
-    let [low, _] = heights(house, surface);
+    let [low, high] = box_of(house, surface);
     let holds = |other: usize| {
-        let [_, top] = heights(house, other);
-        other != surface
-            && is_furniture(&house.placed[other])
-            && (low - top).abs() < 0.3
-            && is_above(house, surface, other)
+        let [other_low, other_high] = box_of(house, other);
+        let overlap = low.x < other_high.x && other_low.x < high.x && low.z < other_high.z && other_low.z < high.z;
+        other != surface && is_furniture(&house.placed[other]) && (low.y - other_high.y).abs() < 0.3 && overlap
     };
-    let stands = low.abs() < 0.3 || (0..house.placed.len()).any(holds);
-    assert!(stands, "'{}' floats at {low} m", house.scene.surfaces[surface].name);
+    let stands = low.y.abs() < 0.3 || (0..house.placed.len()).any(holds);
+    assert!(stands, "'{}' floats at {} m", house.scene.surfaces[surface].name, low.y);
 }
 
 #[test]

@@ -10,11 +10,11 @@ use mateval_dataset::camera::Intrinsics;
 use mateval_dataset::ids::id_text_from;
 use mateval_dataset::material::{ColorInput, MaterialModel};
 use mateval_dataset::reference::Emission;
-use mateval_tracer::{Ray, RenderSettings, World, render};
+use mateval_tracer::{Hit, Ray, RenderSettings, World, render};
 
 use super::*;
 use crate::front3d::camera_rules::{CameraRules, SamplerRules};
-use crate::front3d::camera_sampler::{CameraError, FoundCamera, Refusals, RoomSampler, score, score_grid};
+use crate::front3d::camera_sampler::{CameraError, FoundCamera, Refusal, RoomSampler, score, score_grid};
 use crate::source_scene::SourceScene;
 
 /// The default intrinsics of a recipe.
@@ -24,8 +24,9 @@ fn intrinsics() -> Intrinsics {
     Intrinsics::from_fov_y(480, 270, 50_f64.to_radians())
 }
 
-fn bare_world() -> World {
-    World::new(bare().scene.clone()).unwrap()
+fn bare_world() -> &'static World {
+    static WORLD: OnceLock<World> = OnceLock::new();
+    WORLD.get_or_init(|| World::new(bare().scene.clone()).unwrap())
 }
 
 /// The living room's camera for a seed.
@@ -34,9 +35,15 @@ fn sample(house: &FurnishedHouse, rules: &SamplerRules, seed: u64) -> Result<Fou
     RoomSampler::new(house, &world, LIVING)?.sample(intrinsics(), &TURNS, rules, seed)
 }
 
+/// A few cameras of the living room and the bedroom by BlenderProc's rules.
+fn found_by_default() -> &'static [Vec<FoundCamera>; 2] {
+    static FOUND: OnceLock<[Vec<FoundCamera>; 2]> = OnceLock::new();
+    FOUND.get_or_init(|| [LIVING, 1].map(|room| found(room, &SamplerRules::default())))
+}
+
 /// A few cameras of a room, from the seeds that find one.
-fn found(world: &World, room: usize, rules: &SamplerRules) -> Vec<FoundCamera> {
-    let sampler = RoomSampler::new(bare(), world, room).unwrap();
+fn found(room: usize, rules: &SamplerRules) -> Vec<FoundCamera> {
+    let sampler = RoomSampler::new(bare(), bare_world(), room).unwrap();
     (0..6).filter_map(|seed| sampler.sample(intrinsics(), &TURNS, rules, seed).ok()).collect()
 }
 
@@ -61,16 +68,32 @@ fn nearest_by_search([a, b, c]: [DVec3; 3], from: DVec3) -> f64 {
     at(best[0], best[1])
 }
 
-/// The distance to the nearest surface in the picture in metres, by `side` x `side` rays.
-fn nearest_seen(world: &World, camera: &Camera, side: u32) -> f64 {
-    let mut nearest = f64::INFINITY;
-    for k in 0..side * side {
+/// What `side` x `side` rays through the picture hit.
+fn hits(world: &World, camera: &Camera, side: u32) -> impl Iterator<Item = Hit> {
+    (0..side * side).filter_map(move |k| {
         let share = |v: u32, size: u32| (f64::from(v) + 0.5) / f64::from(side) * f64::from(size);
         let place = DVec2::new(share(k % side, camera.intrinsics.width), share(k / side, camera.intrinsics.height));
-        let ray = Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3());
-        nearest = world.first_hit(&ray).map_or(nearest, |hit| nearest.min(f64::from(hit.distance)));
-    }
-    nearest
+        world.first_hit(&Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3()))
+    })
+}
+
+/// The distance to the nearest surface in the picture in metres.
+fn nearest_seen(world: &World, camera: &Camera, side: u32) -> f64 {
+    hits(world, camera, side).map(|hit| f64::from(hit.distance)).fold(f64::INFINITY, f64::min)
+}
+
+/// The first surface that is a piece whose name contains `word`.
+fn piece_named(word: &str) -> usize {
+    let is_it = |p: &PlacedSurface| p.model.as_ref().is_some_and(|model| model.name.contains(word));
+    bare().placed.iter().position(is_it).unwrap()
+}
+
+/// A hundred rays: these counts at these surfaces, the others at nothing.
+fn rays(counts: &[(usize, usize)]) -> Vec<Option<usize>> {
+    let mut all: Vec<Option<usize>> =
+        counts.iter().flat_map(|(surface, count)| std::iter::repeat_n(Some(*surface), *count)).collect();
+    all.resize(100, None);
+    all
 }
 
 #[test]
@@ -86,14 +109,13 @@ fn same_seed_same_camera() {
 /// have nothing within the clearance.
 #[test]
 fn cameras_stand_free_in_their_room() {
-    let (house, world) = (bare(), bare_world());
+    let house = bare();
     let rules = SamplerRules::default();
     let mut seen = 0;
-    for room in [LIVING, 1] {
-        let floor =
-            house.placed.iter().position(|p| p.room == room && p.origin.role.architecture_kind() == Some("Floor"));
+    for (room, cameras) in [LIVING, 1].into_iter().zip(found_by_default()) {
+        let floor = house.placed.iter().position(|p| p.room == room && is_kind(p, "Floor"));
         let [low, high] = bounds(&house.scene.surfaces[floor.unwrap()].mesh);
-        for found in found(&world, room, &rules) {
+        for found in cameras {
             let at = found.camera.position();
             assert!(at.x > f64::from(low.x) && at.x < f64::from(high.x), "{at}");
             assert!(at.z > f64::from(low.z) && at.z < f64::from(high.z), "{at}");
@@ -120,15 +142,12 @@ fn cameras_stand_free_in_their_room() {
 /// With ten times as many rays a side in all five views, surfaces between the sampler's rays are not much nearer.
 #[test]
 fn nothing_near_is_seen() {
-    let world = bare_world();
     let rules = SamplerRules::default();
     let mut worst = f64::INFINITY;
-    for room in [LIVING, 1] {
-        for found in found(&world, room, &rules) {
-            let views = TURNS.iter().map(|turn| found.camera.turned(turn[0], turn[1])).chain([found.camera]);
-            for view in views {
-                worst = worst.min(nearest_seen(&world, &view, 100));
-            }
+    for found in found_by_default().iter().flatten() {
+        let views = TURNS.iter().map(|turn| found.camera.turned(turn[0], turn[1])).chain([found.camera]);
+        for view in views {
+            worst = worst.min(nearest_seen(bare_world(), &view, 100));
         }
     }
     assert!(worst >= rules.min_distance_m, "{worst}");
@@ -137,10 +156,8 @@ fn nothing_near_is_seen() {
 /// The twin: without the rule, near surfaces are seen.
 #[test]
 fn without_the_rule_near_things_are_seen() {
-    let world = bare_world();
-    let rules = SamplerRules { min_distance_m: 0.0, ..SamplerRules::default() };
-    let all = found(&world, LIVING, &rules);
-    assert!(all.iter().any(|found| nearest_seen(&world, &found.camera, 100) < 1.0));
+    let all = found(LIVING, &SamplerRules { min_distance_m: 0.0, ..SamplerRules::default() });
+    assert!(all.iter().any(|found| nearest_seen(bare_world(), &found.camera, 100) < 1.0));
 }
 
 /// The fork's cameras may look at the outside and at near walls; BlenderProc's rules refuse most of them.
@@ -148,15 +165,13 @@ fn without_the_rule_near_things_are_seen() {
 fn the_forks_cameras_have_a_score_of_furniture_alone() {
     let (house, world) = (bare(), bare_world());
     let rules = CameraRules::ThreeDlg.sampler_rules();
-    let all = found(&world, LIVING, &rules);
+    let all = found(LIVING, &rules);
     assert_eq!(all.len(), 6);
     for found in &all {
-        let seen: Vec<Option<usize>> = score_grid(&found.camera.intrinsics)
-            .map(|place| {
-                let ray = Ray::endless(found.camera.position().as_vec3(), found.camera.direction(place).as_vec3());
-                world.first_hit(&ray).map(|hit| hit.surface.0)
-            })
-            .collect();
+        let ray = |place| Ray::endless(found.camera.position().as_vec3(), found.camera.direction(place).as_vec3());
+        let places = score_grid(&found.camera.intrinsics);
+        let seen: Vec<Option<usize>> =
+            places.map(|place| world.first_hit(&ray(place)).map(|hit| hit.surface.0)).collect();
         let again = score(house, &seen, &rules);
         assert!(again >= 0.5 && (again - found.score).abs() < 0.2 * found.score, "{again} {}", found.score);
     }
@@ -175,22 +190,20 @@ fn rooms_without_a_camera_are_reported() {
         CameraError::NoneFound { room, refusals, .. } if room == "LivingDiningRoom-101" => refusals,
         other => panic!("{other}"),
     };
-    let total =
-        |of: Refusals| of.off_floor + of.sees_outside + of.too_near + of.mean_distance + of.low_score + of.no_clearance;
     let far = SamplerRules { mean_distance_m: [50.0, 60.0], ..rules };
     let error = sample(&house, &far, 1).unwrap_err();
     let message = error.to_string();
     assert!(message.contains("none of 200") && message.contains("outside 50 to 60 m"), "{message}");
     let found = refusals(error);
-    assert!(found.mean_distance > 0 && total(found) == 200, "{found:?}");
+    assert!(found[&Refusal::MeanDistance] > 0 && found.values().sum::<u32>() == 200, "{found:?}");
     let near = SamplerRules { clearance_m: 3.0, ..rules };
     let error = sample(&house, &near, 1).unwrap_err();
     assert!(error.to_string().contains("within 3 m"), "{error}");
     let found = refusals(error);
-    assert!(found.no_clearance > 0 && total(found) == 200, "{found:?}");
+    assert!(found[&Refusal::NoClearance] > 0 && found.values().sum::<u32>() == 200, "{found:?}");
     // The room has no floor.
     for placed in &mut house.placed {
-        if placed.room == LIVING && placed.origin.role.architecture_kind() == Some("Floor") {
+        if placed.room == LIVING && is_kind(placed, "Floor") {
             placed.origin.role = Role::Architecture { kind: "Other".into() };
         }
     }
@@ -203,14 +216,10 @@ fn rooms_without_a_camera_are_reported() {
 fn the_forks_score_is_an_entropy() {
     let house = bare();
     let rules = CameraRules::ThreeDlg.sampler_rules();
-    let of_name = |word: &str| {
-        let is_it = |p: &PlacedSurface| p.model.as_ref().is_some_and(|model| model.name.contains(word));
-        house.placed.iter().position(is_it).unwrap()
-    };
     let is_plain = |p: &PlacedSurface| {
         p.model.as_ref().is_some_and(|m| !["chair", "sofa", "table", "bed"].iter().any(|word| m.name.contains(word)))
     };
-    let (sofa, chair) = (of_name("sofa"), of_name("chair"));
+    let [sofa, chair] = ["sofa", "chair"].map(piece_named);
     let plain = house.placed.iter().position(is_plain).unwrap();
     let wall = house.placed.iter().position(|p| p.model.is_none()).unwrap();
     for (hits, expected) in [
@@ -226,10 +235,7 @@ fn the_forks_score_is_an_entropy() {
         // Three alike: log2 3 bits, (10 + 10 + 1) weights of 10 rays each.
         (vec![(sofa, 10), (chair, 10), (plain, 10)], 2.1 * 1.584_962_500_721_156),
     ] {
-        let mut seen: Vec<Option<usize>> =
-            hits.iter().flat_map(|(surface, count)| std::iter::repeat_n(Some(*surface), *count)).collect();
-        seen.resize(100, None);
-        let found = score(house, &seen, &rules);
+        let found = score(house, &rays(&hits), &rules);
         assert!((found - expected).abs() < 1e-9, "{hits:?}: {found} {expected}");
     }
 }
@@ -240,22 +246,14 @@ fn the_forks_score_is_an_entropy() {
 fn scores_are_those_of_the_formula() {
     let house = bare();
     let of_kind =
-        |kind: &str| house.placed.iter().position(|p| p.origin.role.architecture_kind() == Some(kind)).unwrap();
-    let of_name = |word: &str| {
-        let is_it = |p: &PlacedSurface| p.model.as_ref().is_some_and(|model| model.name.contains(word));
-        house.placed.iter().position(is_it).unwrap()
-    };
-    let rays = |all: &[(usize, usize)]| -> Vec<Option<usize>> {
-        all.iter().flat_map(|(surface, count)| std::iter::repeat_n(Some(*surface), *count)).collect()
-    };
-    let (sofa, wall, floor) = (of_name("sofa"), of_kind("WallInner"), of_kind("Floor"));
+        |kind: &str| (0..house.placed.len()).filter(|at| is_kind(&house.placed[*at], kind)).collect::<Vec<_>>();
+    let (walls, floor) = (of_kind("WallInner"), of_kind("Floor")[0]);
+    let (sofa, wall) = (piece_named("sofa"), walls[0]);
     let rules = SamplerRules::default();
     let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]), &rules);
     assert!((found - 1.54).abs() < 1e-12, "{found}");
     // Rays that hit nothing lower the score: (200 + 0) / 100 * 1 / 3 * 0.8.
-    let mut open = rays(&[(sofa, 20)]);
-    open.resize(100, None);
-    assert!((score(house, &open, &rules) - 2.0 / 3.0 * 0.8).abs() < 1e-12);
+    assert!((score(house, &rays(&[(sofa, 20)]), &rules) - 2.0 / 3.0 * 0.8).abs() < 1e-12);
     // Where architecture weighs nothing: (500 + 0) / 100 * 3 / 3 * (0.5 * 0.7 * 0.8) = 1.4.
     let light = SamplerRules { architecture_weight: 0, ..rules };
     let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]), &light);
@@ -263,20 +261,10 @@ fn scores_are_those_of_the_formula() {
     // If one kind fills the picture, the score is 0.
     assert_eq!(score(house, &rays(&[(wall, 100)]), &rules), 0.0);
     // Two surfaces of one kind count as one: 100 / 100 * 2 / 3 * 0.4 * 0.6.
-    let walls: Vec<usize> = (0..house.placed.len())
-        .filter(|at| house.placed[*at].origin.role.architecture_kind() == Some("WallInner"))
-        .collect();
-    assert!(walls.len() > 1);
     let found = score(house, &rays(&[(walls[0], 30), (walls[1], 30), (floor, 40)]), &rules);
     assert!((found - 0.16).abs() < 1e-12, "{found}");
-    let mut names: BTreeMap<&str, usize> = BTreeMap::new();
-    for placed in &house.placed {
-        if let Some(PlacedModel { name, .. }) = &placed.model {
-            assert_eq!(*name, name.to_lowercase());
-            *names.entry(name).or_insert(0) += 1;
-        }
-    }
-    assert!(names.len() > 5, "{names:?}");
+    let names: BTreeSet<&str> = house.placed.iter().filter_map(|p| Some(p.model.as_ref()?.name.as_str())).collect();
+    assert!(names.len() > 5 && names.iter().all(|name| *name == name.to_lowercase()), "{names:?}");
 }
 
 /// A designer's camera of the house.
@@ -305,16 +293,7 @@ fn in_house(scene: &SourceScene) -> Vec<usize> {
 
 /// The surfaces that a grid of single rays through the picture hits.
 fn met(camera: &Camera, side: u32) -> BTreeSet<usize> {
-    let world = world();
-    let origin = camera.position().as_vec3();
-    let places = (0..side * side).map(|k| {
-        let share = |v: u32, size: u32| (f64::from(v) + 0.5) / f64::from(side) * f64::from(size);
-        DVec2::new(share(k % side, camera.intrinsics.width), share(k / side, camera.intrinsics.height))
-    });
-    places
-        .filter_map(|place| world.first_hit(&Ray::endless(origin, camera.direction(place).as_vec3())))
-        .map(|hit| hit.surface.0)
-        .collect()
+    hits(world(), camera, side).map(|hit| hit.surface.0).collect()
 }
 
 /// Camera 1 looks from the living room through the passage into the bedroom; camera 0 looks the other way.
