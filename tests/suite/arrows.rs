@@ -38,8 +38,8 @@ fn metadata() -> Metadata {
         .unwrap()
 }
 
-/// The crates of ours that each crate uses, as a map draws them: lines as `prep -> sources, dataset`. The arrows of `cli`,
-/// the package that is called like the project, lead to all other crates but `python`, which uses it.
+/// The crates of ours that each crate uses, as a map draws them: lines as `prep -> sources, dataset`. `cli`, the
+/// package that is called like the project, may use all others but `python`, which uses it.
 fn drawn(map: &str) -> BTreeMap<&str, BTreeSet<&str>> {
     let is_word = |user: &str| !user.is_empty() && user.chars().all(|c| c.is_ascii_lowercase());
     let lines = map.lines().filter_map(|line| line.split_once(" -> "));
@@ -63,7 +63,8 @@ fn short(package: &str) -> &str {
 fn differences(package: &str, used: &[&str], drawn: &BTreeMap<&str, BTreeSet<&str>>) -> Vec<String> {
     let Some(expected) = drawn.get(short(package)) else { return vec![format!("the map has no '{package}'")] };
     let used: BTreeSet<&str> = used.iter().map(|name| short(name)).collect();
-    used.symmetric_difference(expected).map(|name| format!("{} -> {name}", short(package))).collect()
+    let in_vain = expected.difference(&used).filter(|_| package != "mateval");
+    used.difference(expected).chain(in_vain).map(|name| format!("{} -> {name}", short(package))).collect()
 }
 
 /// The crates of ours that the package uses when it is built (not when it is tested).
@@ -95,7 +96,7 @@ fn a_wrong_arrow_is_found() {
     assert_eq!(differences("mateval-a", &["mateval-b"], &drawn), ["a -> b"]);
     assert_eq!(differences("mateval-c", &["mateval-a"], &drawn), ["c -> b"]);
     assert_eq!(differences("mateval-c", &["mateval-a", "mateval-b"], &drawn), [""; 0]);
-    assert_eq!(differences("mateval", &["mateval-a", "mateval-b"], &drawn), ["cli -> c"]);
+    assert_eq!(differences("mateval", &["mateval-a", "mateval-b"], &drawn), [""; 0]);
     assert_eq!(differences("mateval-utils", &[], &drawn).len(), 1);
 }
 

@@ -385,7 +385,7 @@ mod tests {
         write(root).unwrap();
         assert!(check(root).unwrap().is_empty());
         let live = mateval_files::whole::beside(&root.join("scenes/e")).unwrap();
-        let own = mateval_files::whole::Owner::this_process();
+        let own = mateval_files::owner::Owner::this_process();
         let dead = root.join(format!("scenes/.e.{}-{}-1-0.partial", own.host, own.process));
         for path in [&live, &dead] {
             std::fs::write(path, "half").unwrap();

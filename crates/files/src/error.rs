@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::whole::Owner;
+use crate::owner::Owner;
 
 /// Why a file or folder could not be read, written or guarded.
 #[derive(Debug, thiserror::Error)]

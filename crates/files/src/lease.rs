@@ -11,7 +11,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::error::FileError;
-use crate::whole::{self, Owner};
+use crate::owner::Owner;
+use crate::whole;
 use crate::work_folder;
 
 /// How often a holder gives a sign of life.

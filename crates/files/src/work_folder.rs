@@ -128,7 +128,7 @@ fn beside(place: &Path) -> Result<PathBuf, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::whole::Owner;
+    use crate::owner::Owner;
 
     #[test]
     fn nothing_is_at_the_place_until_it_is_finished() {

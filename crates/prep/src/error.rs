@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::ids::quoted;
-use mateval_dataset::{SceneId, ViewId};
+use mateval_dataset::{RendererId, SceneId, ViewId};
 use mateval_files::FileError;
 
 use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
-use crate::render::RendererKind;
 
 /// Why a dataset, its renders or a survey could not be made or examined.
 #[derive(Debug, thiserror::Error)]
@@ -101,7 +100,7 @@ pub enum PrepError {
         "'{}' has no pictures by {renderer} of scene {}; run `mateval prep render DATASET --renderer {renderer}`",
         path.display(), quoted(scenes)
     )]
-    NotRendered { path: PathBuf, renderer: RendererKind, scenes: Vec<SceneId> },
+    NotRendered { path: PathBuf, renderer: RendererId, scenes: Vec<SceneId> },
     /// A view's pictures do not have the size of its camera's picture.
     #[error(
         "'{}' contains pictures that do not have the camera's {}x{} pixels; run `mateval prep verify`",

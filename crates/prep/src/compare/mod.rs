@@ -147,7 +147,7 @@ fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), PrepEr
         return Ok(());
     }
     let scenes = scenes.iter().map(|scene| scene.id.clone()).collect();
-    Err(PrepError::NotRendered { path: dataset.root.clone(), renderer: COMPARED, scenes })
+    Err(PrepError::NotRendered { path: dataset.root.clone(), renderer: COMPARED.id(), scenes })
 }
 
 /// Fails where the output would lie in the dataset, or exists and may not be replaced.
