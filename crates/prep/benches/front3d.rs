@@ -9,7 +9,7 @@ use cpu_time::ProcessTime;
 use glam::DVec3;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_prep::atlas::{SizeWish, unwrap};
-use mateval_prep::build::materials::bake;
+use mateval_prep::build::baking::bake;
 use mateval_sources::front3d::room_scene::room_scene;
 use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish, read_house};
 use mateval_testkit::faulty_house;

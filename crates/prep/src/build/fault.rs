@@ -5,7 +5,8 @@ use mateval_files::source_folder::FileFault;
 use mateval_image::ImageError;
 use mateval_sources::front3d::camera_sampler::CameraError;
 
-use super::parts::{LabelFault, TooMany};
+use super::labels::LabelFault;
+use super::parts::TooMany;
 use crate::recipe::fault::RecipeSceneFault;
 
 /// Why a scene cannot be made.

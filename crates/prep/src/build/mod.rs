@@ -1,19 +1,26 @@
 //! Makes the dataset of a recipe scene by scene, each completely or not at all. A run that was killed is resumed.
 //!
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
-//! reads the source with its photo and chooses the input camera; `plan` numbers instances and parts ([`parts`]),
-//! converts the materials and places the views; `pictures` writes what each view shows and refuses scenes that would
-//! become a wrong truth; [`materials`] unwraps every instance and bakes its material; meshes and `scene.json` are
-//! written here. [`finish`] writes the files of the whole dataset. [`fault`] lists why a scene is refused.
+//! reads the source and chooses the input camera; `plan` numbers instances and parts ([`parts`], [`labels`]), reads the
+//! `photo` if the scene has one, converts the materials and places the views (`wide_views`); `pictures` writes what each
+//! view shows, and `refusals` refuses scenes that would become a wrong truth; [`materials`] unwraps every instance and
+//! bakes its material ([`baking`]); meshes and `scene.json` are written here. [`finish`] writes the files of the whole
+//! dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a scene is refused.
 
+pub mod baking;
 pub mod fault;
 pub mod finish;
+pub mod labels;
 pub mod materials;
 pub mod parts;
+mod photo;
 mod pictures;
 mod plan;
+mod refusals;
 mod source;
 pub(crate) mod start;
+pub mod upgrade;
+mod wide_views;
 
 use std::path::Path;
 
@@ -37,8 +44,9 @@ use crate::render::BlenderOptions;
 use fault::{PinFault, SceneFault, above_notes};
 use finish::finish_build;
 use materials::{AtlasSizes, InstanceAtlas, write_materials};
-use pictures::{check_missing, check_unstated, is_lit, write_pictures};
+use pictures::write_pictures;
 use plan::{Plan, make_plan};
+use refusals::{check_missing, check_unstated, is_lit};
 use source::{Baking, read_source};
 pub use start::BuildOptions;
 use start::{

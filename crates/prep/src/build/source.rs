@@ -1,34 +1,31 @@
-//! Reads a recipe's scene from its source, chooses the input camera, and reads the photo if the scene has one.
+//! Reads a recipe's scene from its source, and chooses the input camera.
 
 use std::ffi::OsStr;
 use std::path::Path;
 
 use glam::DVec3;
 use mateval_dataset::camera::{Camera, Intrinsics};
-use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
-use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::dataset::View;
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::material::{Material, MaterialModel, StatedParameters};
 use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, SourceTexture, SurfaceIndex};
 use mateval_dataset::{Progress, Report, Role, SceneLights, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
-use mateval_image::exr_io::{self, Precision};
-use mateval_image::photo::PhotoFile;
+use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::{LinearRgb, Picture, Wrap};
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceScene};
 use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
-use super::fault::{BakeFault, PhotoFault, SceneFault};
+use super::fault::{BakeFault, SceneFault};
 use crate::blender::bake::{Baked, BakedWorld, bake};
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
 use crate::render::BlenderOptions;
-use crate::views::write_preview;
 
 /// Width and height in pixels where neither the recipe nor a glTF with a camera states them.
 const DEFAULT_SIZE: [u32; 2] = [480, 270];
@@ -345,90 +342,4 @@ pub(super) fn views_of(recipe: &Recipe, camera: Camera) -> Vec<View> {
         wide: None,
     });
     std::iter::once(input).chain(turned).collect()
-}
-
-/// The largest file of a photo, in bytes: one of 64 million pixels of 32-bit numbers has 805 million.
-const MAX_PHOTO_BYTES: u64 = 1 << 30;
-
-/// A photo at the size of the camera's picture.
-pub(super) struct ScenePhoto {
-    /// What `scene.json` states of it.
-    pub(super) listed: Photo,
-    /// Linear radiance before exposure.
-    picture: Picture<LinearRgb>,
-}
-
-/// Reads the scene's photo, if the recipe names one, and lists its file among the source's. `source` is the folder of
-/// the recipe's paths.
-pub(super) fn read_photo(
-    entry: &RecipeScene,
-    source: &Path,
-    scene: &mut SourceScene,
-) -> Result<Option<ScenePhoto>, PrepError> {
-    let Some(path) = &entry.photo else { return Ok(None) };
-    let root = entry.root(source);
-    let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
-    let photo = photo_of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
-    let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(SceneFault::Photo(fault)))?;
-    scene.files.extend(folder.into_files().hashes);
-    scene.files.sort();
-    scene.files.dedup();
-    Ok(Some(photo))
-}
-
-fn photo_of_file(
-    folder: &mut SourceFolder,
-    path: &str,
-    camera: &Camera,
-    exposure: f64,
-) -> Result<ScenePhoto, PhotoFault> {
-    let file = SourceFolder::relative(path)?;
-    let bytes = folder.read(&file)?;
-    let photo = PhotoFile::of_bytes(Path::new(&file), bytes)?;
-    let found = [photo.width() as u32, photo.height() as u32];
-    let expected = [camera.intrinsics.width, camera.intrinsics.height];
-    if !fits(found, expected) {
-        return Err(PhotoFault::Size { file, found, expected });
-    }
-    let picture = photo.resized(expected[0] as usize, expected[1] as usize);
-    let (encoding, picture) = match photo.encoding() {
-        Encoding::Linear => (PhotoEncoding::Linear, picture),
-        Encoding::Srgb => {
-            let unexposed = |v: f32| (f64::from(v) / exposure) as f32;
-            (PhotoEncoding::Srgb, picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(unexposed))))
-        }
-    };
-    Ok(ScenePhoto { listed: Photo { file, size: found, encoding }, picture })
-}
-
-/// Whether a photo is at least as large as the camera's picture and, reduced to its width, less than half a row higher
-/// or lower.
-fn fits(photo: [u32; 2], [width, height]: [u32; 2]) -> bool {
-    let reduced = f64::from(photo[1]) * f64::from(width) / f64::from(photo[0]);
-    photo[0] >= width && photo[1] >= height && (reduced - f64::from(height)).abs() < 0.5
-}
-
-impl ScenePhoto {
-    /// Writes `rgb.exr` and `rgb.png` of the input view.
-    pub(super) fn write(&self, folder: &SceneFolder, input: &View, exposure: f64) -> Result<(), PrepError> {
-        let place = folder.view(&input.id);
-        exr_io::write_linear(&place.join("rgb.exr"), &self.picture, Precision::Float)?;
-        write_preview(&place, &self.picture, exposure)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_photo_has_the_proportions_of_the_picture_and_at_least_its_size() {
-        assert!(fits([64, 48], [64, 48]));
-        assert!(fits([4000, 3000], [64, 48]));
-        // A sensor of odd proportions, less than half a row off.
-        assert!(fits([4032, 3024 + 20], [64, 48]));
-        for wrong in [[64, 49], [1920, 1080], [48, 64], [32, 24]] {
-            assert!(!fits(wrong, [64, 48]), "{wrong:?}");
-        }
-    }
 }

@@ -16,7 +16,7 @@ use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_files::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
 use serde::{Deserialize, Serialize};
 
-use super::parts::file_names;
+use super::labels::file_names;
 use crate::error::PrepError;
 use crate::recipe::fault::{RecipeFault, RecipeSceneFault};
 use crate::recipe::{Recipe, RecipeScene, SourcePath};
