@@ -70,7 +70,7 @@ fn unsound(reason: std::io::Error) -> Malformed {
     Malformed(format!("not a valid NumPy array: {reason}"))
 }
 
-pub(crate) fn joined(shape: &[u64]) -> String {
+fn joined(shape: &[u64]) -> String {
     shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
 }
 
@@ -133,7 +133,8 @@ struct Layout {
 impl Layout {
     fn of(shape: &[u64]) -> Result<Self, Malformed> {
         let refused = |what: &str| Err(Malformed(format!("an array of shape ({}){what}", joined(shape))));
-        const EXPECTED: &str = "; expected (rows, columns), (rows, columns, channels) or (channels, rows, columns) with 1, 3 or 4 channels";
+        const EXPECTED: &str = "; expected (rows, columns), (rows, columns, channels) or (channels, rows, columns) with \
+                                1, 3 or 4 channels";
         let lead = shape.iter().take(shape.len().saturating_sub(3)).take_while(|axis| **axis == 1).count();
         let is_channels = |axis: u64| matches!(axis, 1 | 3 | 4);
         match shape[lead..] {

@@ -1,5 +1,5 @@
-//! The XML as a tree of plain elements, with variables substituted and names in snake_case. Size is checked
-//! first, and depth while the tree is made: the parser does not recurse.
+//! The XML as a tree of plain elements, with variables substituted and names in snake_case. Size is checked first, and
+//! depth while the tree is made: the parser does not recurse.
 
 use std::collections::BTreeMap;
 
@@ -16,12 +16,16 @@ pub struct Limits {
     /// Bytes of the XML, before and after variables are substituted.
     pub xml_bytes: u64,
     pub xml_depth: usize,
+    /// Bytes of any other file.
     pub file_bytes: u64,
     /// Bytes of all OBJ files, each counted as often as it is named. Once exceeded, no further file is read.
     pub mesh_bytes: u64,
     pub shapes: usize,
+    /// Triangles of all shapes.
     pub triangles: usize,
+    /// Vertices of all shapes.
     pub vertices: usize,
+    /// Texels of all textures.
     pub texels: usize,
     /// Number of findings. Further ones are only counted.
     pub findings: usize,

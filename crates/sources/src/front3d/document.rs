@@ -16,8 +16,11 @@ pub struct Limits {
     pub json_values: usize,
     /// Lists and objects in the JSON, each of which takes more memory than a number.
     pub json_containers: usize,
+    /// Bytes of any other file.
     pub file_bytes: u64,
+    /// Triangles of all models and meshes.
     pub triangles: usize,
+    /// Texels of all textures.
     pub texels: usize,
     pub rooms: usize,
     /// Children of all rooms.

@@ -28,6 +28,7 @@ pub struct Limits {
     pub triangles: usize,
     /// Vertices of all instances, counted like triangles.
     pub vertices: usize,
+    /// Texels of all textures.
     pub texels: usize,
     /// Number of lights. Each is rendered apart, so that the light of a view can be weighted anew.
     pub lights: usize,
