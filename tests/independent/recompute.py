@@ -64,6 +64,26 @@ def psnr(mse):
     return min(-10 * np.log10(mse), 100.0) if mse > 0 else 100.0
 
 
+def ssim_map(prediction, reference):
+    """The mean of SSIM and its map, of encoded pictures."""
+    options = dict(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1.0, channel_axis=-1)
+    return structural_similarity(prediction, reference, full=True, **options)
+
+
+def whole_windows(mask):
+    """The pixels whose window lies inside the mask."""
+    return minimum_filter(mask.astype(np.uint8), WINDOW, mode="constant") > 0
+
+
+def colour_difference(prediction, truth, mask):
+    """The mean CIEDE2000 of linear pictures."""
+    return deltaE_ciede2000(*(lab(np.clip(picture, 0, 1)) for picture in (prediction, truth)))[mask].mean()
+
+
+#: The metrics of linear pictures of base colour, over the valid pixels of a view.
+LINEAR_METRICS = {"delta_e": colour_difference}
+
+
 class Similarity:
     """SSIM, LPIPS and FLIP of two encoded pictures over a mask."""
 
@@ -91,10 +111,9 @@ class Similarity:
 
     def values(self, prediction, reference, mask, with_flip):
         found = {}
-        options = dict(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1.0, channel_axis=-1)
-        whole = minimum_filter(mask.astype(np.uint8), WINDOW, mode="constant") > 0
+        whole = whole_windows(mask)
         if whole.any():
-            found["ssim"] = structural_similarity(prediction, reference, full=True, **options)[1].mean(-1)[whole].mean()
+            found["ssim"] = ssim_map(prediction, reference)[1].mean(-1)[whole].mean()
         filled = np.where(mask[..., None], prediction, reference)
         if self.lpips is not None and min(mask.shape) >= 32:
             tensor = lambda picture: self.torch.tensor(picture.transpose(2, 0, 1)[None] * 2 - 1, dtype=self.torch.float32)
@@ -199,7 +218,8 @@ def scene_means(dataset, pictures, scene, similarity):
             clipped = [np.clip(a, 0, 1) for a in (picture, truth)]
             for metric, value in similarity.values(*map(encoded, clipped), valid, False).items():
                 values[kind, whole, metric].append(value)
-            values[kind, whole, "delta_e"].append(deltaE_ciede2000(*map(lab, clipped))[valid].mean())
+            for metric, value in LINEAR_METRICS.items():
+                values[kind, whole, metric].append(value(picture, truth, valid))
         for kind in ("roughness", "metallic"):
             if not description["source"][f"states_{kind}"]:
                 continue

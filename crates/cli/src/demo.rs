@@ -380,18 +380,10 @@ fn score_submissions(
         options.baselines.iter().copied().filter(|baseline| !places.result(*baseline).exists()).collect();
     if !missing.is_empty() {
         let submissions: Vec<PathBuf> = missing.iter().map(|baseline| places.submission(*baseline)).collect();
-        let plan = ScorePlan {
-            dataset,
-            submissions: submissions.iter().map(PathBuf::as_path).collect(),
-            protocols: vec![Protocol::named(PROTOCOL)?],
-            scenes: Vec::new(),
-            lpips,
-            tool: TOOL.to_owned(),
-            jobs: 1,
-            cache: Some(&places.scores),
-            only_cached: false,
-            pictures: None,
-        };
+        let (submissions, protocols) =
+            (submissions.iter().map(PathBuf::as_path).collect(), vec![Protocol::named(PROTOCOL)?]);
+        let plan = ScorePlan::new(dataset, submissions, protocols, lpips, TOOL);
+        let plan = ScorePlan { cache: Some(&places.scores), ..plan };
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
         for (result, baseline) in results.iter().zip(missing) {
             json::write_lines(&places.result(baseline), result)?;

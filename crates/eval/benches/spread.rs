@@ -15,9 +15,10 @@ use std::path::Path;
 
 use mateval_dataset::SceneId;
 use mateval_dataset::open::Dataset;
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result::key::{Metric, Surfaces, Views};
+use mateval_eval::result::key::{Surfaces, Views};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -34,18 +35,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if samples > 0 {
             (protocol.light.samples.least, protocol.light.samples.most) = (samples, samples);
         }
-        let plan = ScorePlan {
-            dataset: &dataset,
-            submissions: submissions.iter().map(Path::new).collect(),
-            protocols: vec![protocol],
-            scenes: vec![scene.clone()],
-            lpips: LpipsWeights::Missing { reason: "not measured".to_owned(), fix: String::new() },
-            tool: "spread".to_owned(),
-            jobs: 1,
-            cache: None,
-            only_cached: false,
-            pictures: None,
-        };
+        let submissions = submissions.iter().map(Path::new).collect();
+        let lpips = LpipsWeights::Missing { reason: "not measured".to_owned(), fix: String::new() };
+        let plan = ScorePlan::new(&dataset, submissions, vec![protocol], lpips, "spread");
+        let plan = ScorePlan { scenes: vec![scene.clone()], ..plan };
         let results = score(&plan, &|_| ())?;
         Ok(results.into_iter().map(|mut result| result.protocols.remove("mateval-3").expect("it was scored")).collect())
     };

@@ -6,7 +6,6 @@ use mateval_dataset::ids::quoted;
 use mateval_dataset::{SceneId, ViewId};
 use mateval_files::FileError;
 
-/// Why something could not be scored or shown.
 #[derive(Debug, thiserror::Error)]
 pub enum EvalError {
     #[error(transparent)]
@@ -33,25 +32,18 @@ pub enum EvalError {
     /// A result states a number that does not follow from the others in it.
     #[error("'{}': at {place} it states {said}, but its own numbers give {found}; it was changed by hand", path.display())]
     Contradiction { path: PathBuf, place: String, said: String, found: String },
-    /// The dataset has no renders.
     #[error("the dataset '{}' has no renders; run `mateval prep render DATASET`", dataset.display())]
     NoPhotoRenderer { dataset: PathBuf },
     /// The scene has a photo from elsewhere, so it has no renders.
     #[error("scene '{scene}' has no renders: its input picture is a photo from elsewhere, whose light is not known")]
     Photographed { scene: SceneId },
-    /// No protocol has the name.
     #[error("cannot score: there is no protocol '{name}'; use one of: {}", known.join(", "))]
     UnknownProtocol { name: String, known: &'static [&'static str] },
-    /// The protocol was removed.
-    #[error("cannot score: protocol '{name}' was removed before any release, since {reason}; use 'mateval-3'")]
-    RemovedProtocol { name: String, reason: &'static str },
-    /// A protocol was written for another version of the scorer.
     #[error(
         "cannot score: protocol '{protocol}' expects version {found} of the scorer, this is version {expected}; \
          use the protocols of this version"
     )]
     ScorerVersion { protocol: String, expected: u32, found: u32 },
-    /// A protocol states a constant that the code does not have.
     #[error(
         "cannot score: protocol '{protocol}' states fixed.{rule} = {found}, the code has {expected}, which no protocol can \
          change; use the protocols of this version"
@@ -67,40 +59,28 @@ pub enum EvalError {
     LpipsWeights { reason: String, fix: String },
     /// The dataset is not what its format says.
     #[error("{place}: expected {expected}, found {found}; run `mateval prep verify`")]
-    Unsound {
-        /// The file, scene or view.
-        place: String,
-        expected: String,
-        found: String,
-    },
+    Unsound { place: String, expected: String, found: String },
     /// `targets.json` lists views of a scene without its input view.
     #[error(
         "scene '{scene}': targets.json lists views without the input view, to which light is fitted; add it, or score \
          without light"
     )]
     InputNotTarget { scene: SceneId },
-    /// The dataset or the submission could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_dataset::SceneError),
-    /// The submission could not be read.
     #[error(transparent)]
     Submission(#[from] mateval_submission::SubmissionError),
-    /// The lights could not be fitted.
     #[error(transparent)]
     Light(#[from] mateval_light::LightError),
-    /// The tracer cannot work with the scene.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),
-    /// A picture could not be read.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-    /// Two pictures of a view could not be compared.
     #[error("scene '{scene}', view '{view}': {source}")]
     Metric { scene: SceneId, view: ViewId, source: mateval_metrics::MetricError },
 }
 
 impl EvalError {
-    /// The scene has no input view.
     pub(crate) fn no_input_view(scene: &SceneId) -> Self {
         let [expected, found] = ["an input view", "none"].map(str::to_owned);
         Self::Unsound { place: format!("scene '{scene}'"), expected, found }

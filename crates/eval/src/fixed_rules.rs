@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::light::difference::{DIFFERENCE, DifferenceRules};
 use crate::light::error::ONE_SIDED_95;
-use crate::result::key::{HALF_A_BYTE, LPIPS_NET};
+use crate::metric::{HALF_A_BYTE, LPIPS_NET};
 
 /// Defines [`FixedRules`] and its one value: name, type and constant of every rule stand together.
 macro_rules! fixed_rules {

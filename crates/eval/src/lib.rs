@@ -3,7 +3,8 @@
 //! In: a dataset with its ground truth, a submission, the weights of LPIPS. Out: [`result::ResultFile`], or, from
 //! [`verify`], whether a result states what the submission scores.
 //!
-//! [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those that they may not. For each
+//! [`metric`] is the table of metrics; [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those
+//! that they may not. For each
 //! [`scene`] of the dataset ([`open_scene`]), [`score()`](score::score) reads the submissions' maps
 //! ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
 //!
@@ -21,6 +22,7 @@
 
 pub mod error;
 pub mod fixed_rules;
+pub mod metric;
 pub mod open_scene;
 mod pictures_dir;
 pub mod protocol;

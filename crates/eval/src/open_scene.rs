@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{SceneFolder, is_rendered};
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{RendererId, SceneError, TriangleMesh, glb, reference};
+use mateval_dataset::{SceneError, TriangleMesh, glb, reference};
 use mateval_tracer::World;
 
 use crate::error::EvalError;
@@ -27,12 +27,10 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
 pub(crate) enum ViewSet {
     /// The input view, and those that are it turned: they share their paths.
     Turned,
-    /// Views from other places.
     Wide,
 }
 
 impl ViewSet {
-    /// The views of the set; empty where there are none.
     pub(crate) fn of<'a>(self, views: &[&'a View]) -> Vec<&'a View> {
         views.iter().filter(|view| view.id.is_wide() == (self == Self::Wide)).copied().collect()
     }
@@ -46,7 +44,6 @@ impl ViewSet {
     }
 }
 
-/// A scene, opened for scoring.
 pub struct OpenScene {
     pub folder: SceneFolder,
     /// Its true geometry, materials and lights, ready for ray tracing.
@@ -57,8 +54,8 @@ pub struct OpenScene {
 
 impl OpenScene {
     /// Fails if a file differs from the dataset's manifest or does not fit the others: numbers carry the dataset's
-    /// fingerprint, so they must come from the files that it covers. Renders are not checked; `check_photos` does that
-    /// for those of the photo's renderer, and references are checked when they are opened.
+    /// fingerprint, so they must come from the files that it covers. Renders are not checked here: references
+    /// are when they are opened.
     pub fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Self, EvalError> {
         // The input picture is a copy of a photo renderer's, which may have been renewed since.
         let is_needed = |file: &str| !is_rendered(file) && !file.starts_with("views/input/rgb.");
@@ -68,12 +65,6 @@ impl OpenScene {
         let atlases = read_atlases(&folder, scene, &world)?;
         Ok(Self { folder, world, atlases })
     }
-}
-
-/// Fails if a picture with which fitted light is compared differs from the dataset's manifest.
-pub(crate) fn check_photos(dataset: &Dataset, scene: &SceneFile, renderer: &RendererId) -> Result<(), EvalError> {
-    let folder = format!("ground_truth/renders/{renderer}/");
-    Ok(dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?)
 }
 
 /// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's

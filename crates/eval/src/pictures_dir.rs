@@ -18,13 +18,12 @@ use crate::light::difference::{ViewGuide, guided_mean, mean_of};
 use crate::light::lighting::LightingName;
 use crate::materials::pictures::MaterialPictures;
 
-/// Where the pictures of submissions go.
-pub struct PicturesDir<'a> {
+pub struct PicturesDir {
     /// A folder for each submission, in the order of the plan.
-    pub folders: &'a [PathBuf],
+    pub folders: Vec<PathBuf>,
 }
 
-impl PicturesDir<'_> {
+impl PicturesDir {
     /// The file of an instance's texels, in a folder that exists.
     pub(crate) fn texels(
         &self,

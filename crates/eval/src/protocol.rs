@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::fixed_rules::FixedRules;
-use crate::result::key::{HEADLINE, PAPER_HEADLINE, PictureKind, ResultKey};
+use crate::metric::PictureKind;
+use crate::result::key::{HEADLINE, PAPER_HEADLINE, ResultKey};
 
 /// Colour space in which MSE and PSNR of albedo are taken. SSIM and LPIPS always see sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -28,7 +29,6 @@ pub enum AlbedoSpace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
-    /// Its name.
     pub name: String,
     /// The treatment of pixels outside a mask.
     pub mask_rule: MaskRule,
@@ -40,11 +40,9 @@ pub struct Protocol {
     pub rounded_decimals: u32,
     /// The numbers that a table would print; the first orders boards.
     pub headline: Vec<ResultKey>,
-    /// The light under which predictions are compared.
     pub light: LightRules,
     /// Constants that all protocols share because the code holds them.
     pub fixed: FixedRules,
-    /// [`SCORER_VERSION`].
     pub scorer_version: u32,
 }
 
@@ -53,10 +51,8 @@ pub struct Protocol {
 pub const SCORER_VERSION: u32 = 10;
 
 impl Protocol {
-    /// The names that [`Protocol::named`] knows.
     pub const NAMES: [&str; 2] = ["mateval-3", "paper"];
 
-    /// A protocol by name.
     pub fn named(name: &str) -> Result<Self, EvalError> {
         let (mask_rule, albedo_space, light) = match name {
             "mateval-3" => {
@@ -69,17 +65,7 @@ impl Protocol {
                 light.samples = SampleRules { at_320x240: 16, least: 16, most: 16, ..light.samples };
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
-            "mateval-1" => {
-                let reason = "under it the true material did not always score best";
-                return Err(EvalError::RemovedProtocol { name: name.to_owned(), reason });
-            }
-            "mateval-2" => {
-                let reason = "it compared renders with another renderer's noise, and stated errors that were up to five times off";
-                return Err(EvalError::RemovedProtocol { name: name.to_owned(), reason });
-            }
-            _ => {
-                return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES });
-            }
+            _ => return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES }),
         };
         Ok(Self {
             name: name.to_owned(),
@@ -170,11 +156,8 @@ pub struct LightRules {
     /// The positions of a stage's lights: constants by name, which `PROTOCOL.md` defines.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub stage: StageRules,
-    /// The fit of radiances.
     pub fit: FitRules,
-    /// The weights of track `relit`.
     pub relit: RelitRules,
-    /// The samples of predictions.
     pub samples: SampleRules,
 }
 
@@ -195,7 +178,6 @@ pub struct RelitRules {
     pub least_share: f64,
 }
 
-/// The samples of predictions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleRules {
@@ -235,7 +217,6 @@ impl LightRules {
         }
     }
 
-    /// Settings of a render with `samples` per pixel.
     pub fn settings(&self, samples: u32) -> mateval_tracer::RenderSettings {
         mateval_tracer::RenderSettings {
             samples,
@@ -263,22 +244,32 @@ mod tests {
             base.fingerprint("a", &[&scene], Some("v")),
             base.fingerprint("a", &[&scene], None),
             print(&Protocol::named("paper").unwrap()),
-            print(&Protocol { albedo_space: AlbedoSpace::Srgb, ..base.clone() }),
-            print(&Protocol { mask_rule: MaskRule::BlackFill, ..base.clone() }),
-            print(&Protocol { rounded_decimals: 5, ..base.clone() }),
         ];
         prints.sort();
         prints.dedup();
-        assert_eq!(prints.len(), 9);
+        assert_eq!(prints.len(), 6);
     }
 
-    /// `PROTOCOL.md` publishes the hashes: a constant that changes must change them there, and raise [`SCORER_VERSION`]
-    /// if numbers of the same protocol do.
+    /// `PROTOCOL.md` holds the table of metrics and the hashes; with `MATEVAL_WRITE_DOCS=1` this writes them. A constant
+    /// that changes a hash raises [`SCORER_VERSION`] if numbers of the same protocol change.
     #[test]
-    fn published_hashes_hold() {
-        let text = include_str!("../../../dataset_spec/PROTOCOL.md");
-        let rows = Protocol::NAMES.map(|name| format!("| `{name}` | `{}` |", Protocol::named(name).unwrap().sha256()));
-        assert!(rows.iter().all(|row| text.contains(row)), "PROTOCOL.md should say:\n{}", rows.join("\n"));
+    fn published_tables_hold() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../dataset_spec/PROTOCOL.md");
+        let before = std::fs::read_to_string(path).unwrap();
+        let replaced = |text: &str, start: &str, end: &str, by: &str| {
+            let (head, rest) = text.split_once(start).unwrap_or_else(|| panic!("no '{start}' in PROTOCOL.md"));
+            let (_, tail) = rest.split_once(end).unwrap();
+            format!("{head}{by}{end}{tail}")
+        };
+        let mut text = replaced(&before, "| Metric | Better", "\n\n", crate::metric::markdown().trim_end());
+        for name in Protocol::NAMES {
+            let start = format!("| `{name}` | `");
+            text = replaced(&text, &start, "` |", &format!("{start}{}", Protocol::named(name).unwrap().sha256()));
+        }
+        if std::env::var_os("MATEVAL_WRITE_DOCS").is_some() {
+            std::fs::write(path, &text).unwrap();
+        }
+        assert!(text == before, "PROTOCOL.md is not up to date; set MATEVAL_WRITE_DOCS=1 and run this test again");
     }
 
     /// Every number and word of a protocol, changed by itself, changes its hash.
@@ -331,15 +322,9 @@ mod tests {
 
     #[test]
     fn an_unknown_name_says_what_is_known() {
-        let error = Protocol::named("papr").unwrap_err().to_string();
-        assert!(error.contains("'papr'") && error.contains("paper"), "{error}");
-    }
-
-    #[test]
-    fn removed_protocols_are_refused_with_a_reason() {
-        for (name, reason) in [("mateval-1", "did not always score best"), ("mateval-2", "another renderer's noise")] {
+        for name in ["papr", "mateval-2"] {
             let error = Protocol::named(name).unwrap_err().to_string();
-            assert!(error.contains(reason) && error.contains("use 'mateval-3'"), "{error}");
+            assert!(error.contains(name) && error.contains("use one of: mateval-3, paper"), "{error}");
         }
     }
 

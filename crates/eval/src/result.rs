@@ -12,8 +12,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::light::lighting::LightingName;
+use crate::metric::{Metric, PictureKind};
 use crate::protocol::Protocol;
-use crate::result::key::{Metric, PictureKind, PictureName, Region, ResultKey, Views};
+use crate::result::key::{PictureName, Region, ResultKey, Views};
 
 pub mod key;
 pub mod means;
@@ -31,13 +32,11 @@ pub struct ResultFile {
     pub tool: String,
     /// The method's name, from submission.json.
     pub method: String,
-    /// The submission.
     pub submission: SubmissionId,
     /// The dataset and the scored scenes.
     pub dataset: DatasetId,
     /// SHA-256 of the weights of each network; null where they were missing.
     pub lpips_weights: BTreeMap<String, Option<String>>,
-    /// The scores, by protocol.
     pub protocols: BTreeMap<String, ProtocolResult>,
     /// Maps that the submission holds for no instance of any scored scene, by their words in its files. They have no
     /// values; under light they are the default.
@@ -60,13 +59,11 @@ impl ResultFile {
     }
 }
 
-/// A submission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionId {
     /// SHA-256, hex, over path and SHA-256 of submission.json and of every map of the scored scenes, in order.
     pub sha256: String,
-    /// Its own description.
     pub description: String,
     /// Where to read about it, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -86,7 +83,6 @@ pub struct SubmissionId {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProtocolResult {
-    /// The protocol itself.
     pub protocol: Protocol,
     /// Numbers of different fingerprints must not be compared.
     pub fingerprint: String,
@@ -99,7 +95,6 @@ pub struct ProtocolResult {
     /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where
     /// the error of a picture may be noise alone.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
-    /// The radiances that were fitted, by scene.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// The values of every picture over every region.
     pub pictures: Vec<PictureValues>,
@@ -123,9 +118,7 @@ pub struct TracerCheck {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceTexelErrors {
-    /// Its scene.
     pub scene: SceneId,
-    /// The instance.
     pub instance: InstanceId,
     /// Texels that the input view sees.
     pub observed: TexelErrors,
@@ -147,9 +140,7 @@ pub struct TexelErrors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstancePixelErrors {
-    /// Its scene.
     pub scene: SceneId,
-    /// The instance.
     pub instance: InstanceId,
     /// The source's category; for architecture the kind of piece, as in `WallInner`; else null.
     pub category: Option<String>,
@@ -170,9 +161,7 @@ pub struct InstancePixelErrors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PictureValues {
-    /// Its scene.
     pub scene: SceneId,
-    /// Its view.
     pub view: ViewId,
     /// What was compared; ends with `_specular` where only pixels that are metal or smooth in truth count.
     pub picture: PictureName,
@@ -201,11 +190,8 @@ pub struct PictureValues {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissingMetric {
-    /// The numbers.
     pub metric: MissingNumbers,
-    /// Why.
     pub reason: String,
-    /// The command that makes the metric available.
     pub fix: String,
 }
 
@@ -213,9 +199,7 @@ pub struct MissingMetric {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum MissingNumbers {
-    /// All numbers of that metric.
     Metric(Metric),
-    /// All numbers of that kind of picture.
     Picture(PictureKind),
 }
 
@@ -239,6 +223,22 @@ impl std::str::FromStr for MissingNumbers {
 by_text!(MissingNumbers, UnknownWord, "^[a-z0-9_]+$");
 
 impl PictureValues {
+    /// A picture without values yet.
+    pub fn new(scene: SceneId, view: ViewId, picture: PictureName, region: Region, pixels: usize) -> Self {
+        Self {
+            scene,
+            view,
+            picture,
+            lighting: None,
+            region,
+            pixels,
+            values: BTreeMap::new(),
+            mse_error: None,
+            exact: false,
+            lower_bound: false,
+        }
+    }
+
     /// The mean that one of its values counts for.
     pub fn key(&self, metric: Metric) -> ResultKey {
         ResultKey { picture: self.picture, views: Views::of(&self.view, self.region), metric }

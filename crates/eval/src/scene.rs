@@ -19,25 +19,22 @@ use crate::light::difference::base_color_ratio;
 use crate::light::error::LightMse;
 use crate::light::lighting::LightingName;
 use crate::light::reference::StoredReference;
+use crate::metric::PictureKind;
 use crate::open_scene::ViewSet;
 use crate::pictures_dir::PicturesDir;
 use crate::protocol::Protocol;
-use crate::result::key::{PictureKind, PictureName, Region, ResultKey, Surfaces, Views};
+use crate::result::key::{PictureName, Region, ResultKey, Surfaces, Views};
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValues};
 use crate::truth::ViewTruth;
 
-/// Everything that is needed to score submissions on one scene.
 #[derive(Clone)]
 pub(crate) struct SceneTask<'a> {
-    /// Folder of the dataset.
     pub(crate) dataset: &'a Path,
     pub(crate) scene: &'a SceneFile,
     pub(crate) folder: &'a SceneFolder,
     pub(crate) world: &'a World,
     pub(crate) atlases: &'a [TriangleMesh],
-    /// The views that are scored.
     pub(crate) views: Vec<&'a View>,
-    /// The set that they are.
     pub(crate) set: ViewSet,
     pub(crate) predictions: &'a [PredictedScene],
     pub(crate) protocols: &'a [Protocol],
@@ -47,11 +44,10 @@ pub(crate) struct SceneTask<'a> {
     /// The photo's renderer. Without it, fitted light is not scored.
     pub(crate) renderer: Option<&'a RendererId>,
     /// Where pictures are kept for whoever recomputes the numbers.
-    pub(crate) pictures: Option<&'a PicturesDir<'a>>,
+    pub(crate) pictures: Option<&'a PicturesDir>,
     pub(crate) progress: Progress<'a>,
 }
 
-/// Pictures of base colour in every view.
 pub(crate) struct BaseColors {
     /// From the true atlases.
     pub(crate) truth: Vec<Picture<LinearRgb>>,
@@ -79,34 +75,24 @@ impl SceneTask<'_> {
         (!views.is_empty()).then(|| Self { views, set, ..self.clone() })
     }
 
-    /// The true maps and masks of the views.
     pub(crate) fn truths(&self) -> Result<Vec<ViewTruth>, EvalError> {
         self.views.iter().map(|view| ViewTruth::read(self.folder, view)).collect()
     }
 
-    /// The view that methods see.
     pub(crate) fn input_view(&self) -> Result<&View, EvalError> {
         self.scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&self.scene.id))
     }
 
-    /// Pixels of a view.
-    pub(crate) fn pixels(&self) -> u64 {
-        self.views.first().map_or(0, |view| pixels(view))
-    }
-
-    /// Pixels of all views together.
-    pub(crate) fn pixels_of_all_views(&self) -> u64 {
-        self.views.iter().map(|view| pixels(view)).sum()
+    /// Pixels of each view.
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = u64> + '_ {
+        let of = |view: &&View| u64::from(view.camera.intrinsics.width) * u64::from(view.camera.intrinsics.height);
+        self.views.iter().map(of)
     }
 
     /// Adds scene and view to an error of a metric.
     pub(crate) fn locate_error<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
         found.map_err(|source| EvalError::Metric { scene: self.scene.id.clone(), view: view.id.clone(), source })
     }
-}
-
-fn pixels(view: &View) -> u64 {
-    u64::from(view.camera.intrinsics.width) * u64::from(view.camera.intrinsics.height)
 }
 
 /// The regions of a view over which metrics are computed: all valid pixels first.
@@ -136,18 +122,9 @@ impl MaskedRegion {
         kind: PictureKind,
         lighting: Option<LightingName>,
     ) -> PictureValues {
-        PictureValues {
-            scene: scene.clone(),
-            view: view.clone(),
-            picture: PictureName { kind, surfaces: self.surfaces },
-            lighting,
-            region: self.region,
-            pixels: mateval_metrics::pixel::pixel_count(&self.mask),
-            values: Default::default(),
-            mse_error: None,
-            exact: false,
-            lower_bound: false,
-        }
+        let picture = PictureName { kind, surfaces: self.surfaces };
+        let pixels = mateval_metrics::pixel::pixel_count(&self.mask);
+        PictureValues { lighting, ..PictureValues::new(scene.clone(), view.clone(), picture, self.region, pixels) }
     }
 }
 
@@ -179,14 +156,22 @@ pub(crate) struct ScoreSheet {
 pub(crate) struct InstanceErrors(BTreeMap<(PictureKind, Views, u16), (f64, usize)>);
 
 impl InstanceErrors {
-    /// Adds `error(k)`, a mean over channels, of every pixel k in the mask to the instance that it shows.
-    pub(crate) fn add(
+    /// Adds `error(k)`, a mean over channels, of every valid pixel k of a view to the instance that it shows.
+    pub(crate) fn add(&mut self, picture: PictureKind, view: &ViewId, truth: &ViewTruth, error: impl Fn(usize) -> f64) {
+        let ViewTruth { instances, valid, unobserved, .. } = truth;
+        self.add_region(picture, Views::of(view, Region::Valid), instances, valid, &error);
+        if let Some(unobserved) = unobserved {
+            self.add_region(picture, Views::of(view, Region::Unobserved), instances, unobserved, &error);
+        }
+    }
+
+    fn add_region(
         &mut self,
         picture: PictureKind,
         views: Views,
         instances: &Picture<u16>,
         mask: &Mask,
-        error: impl Fn(usize) -> f64,
+        error: &impl Fn(usize) -> f64,
     ) {
         let mut sums: BTreeMap<u16, (f64, usize)> = BTreeMap::new();
         for (pixel, instance) in instances.pixels().iter().enumerate().filter(|(pixel, _)| mask.pixels()[*pixel]) {

@@ -7,8 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::BuildFolder;
-use mateval_dataset::open::Dataset;
-use mateval_dataset::open::DatasetId;
+use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::verdict::{CompareCounts, VerdictFile};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
@@ -16,32 +15,26 @@ use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_metrics::Lpips;
 use mateval_submission::atlas::AtlasMeshes;
-use mateval_submission::files::SubmissionJson;
-use mateval_submission::files::{HashedFile, submission_sha256};
+use mateval_submission::files::{HashedFile, SubmissionJson, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::score_light;
-use crate::open_scene::{OpenScene, ViewSet, check_photos, scored_views};
+use crate::metric::{LPIPS_NET, Metric, PictureKind};
+use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::pictures_dir::PicturesDir;
 use crate::protocol::{Protocol, Track};
-use crate::result::key::{LPIPS_NET, Metric, PictureKind};
 use crate::result::means::{means, summary_noise};
 use crate::result::{
     MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
 };
 use crate::scene::{SceneScore, SceneTask, ScoreSheet};
 
-/// The network of LPIPS, or the reason why it is missing.
+/// The network of LPIPS, or why it is missing and the command that makes it available.
 pub enum LpipsWeights {
     Loaded(Box<Lpips>),
-    Missing {
-        /// The reason, for the result's list of missing metrics.
-        reason: String,
-        /// The command that makes the metric available.
-        fix: String,
-    },
+    Missing { reason: String, fix: String },
 }
 
 impl LpipsWeights {
@@ -53,14 +46,12 @@ impl LpipsWeights {
     }
 }
 
-/// What to score.
 pub struct ScorePlan<'a> {
     pub dataset: &'a Dataset,
     pub submissions: Vec<&'a Path>,
     pub protocols: Vec<Protocol>,
     /// The scenes to score; all if empty.
     pub scenes: Vec<SceneId>,
-    /// The network of LPIPS.
     pub lpips: LpipsWeights,
     /// Name and version of the tool, for the result.
     pub tool: String,
@@ -85,7 +76,6 @@ struct Entry {
     scores: Vec<Vec<(SceneId, SceneScore)>>,
 }
 
-/// The scores of one submission in one scene.
 struct Outcome {
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
@@ -107,18 +97,8 @@ struct Outcome {
 ///
 /// let dataset = Dataset::open(Path::new("dataset"))?;
 /// let lpips = Lpips::load(Net::Alex, Path::new("lpips-alex-v0.1.safetensors"))?;
-/// let plan = ScorePlan {
-///     dataset: &dataset,
-///     submissions: vec![Path::new("submission")],
-///     protocols: vec![Protocol::named("mateval-3")?],
-///     scenes: Vec::new(),
-///     lpips: LpipsWeights::Loaded(Box::new(lpips)),
-///     tool: "my tool 1.0".to_owned(),
-///     jobs: 1,
-///     cache: None,
-///     only_cached: false,
-///     pictures: None,
-/// };
+/// let (submissions, protocols) = (vec![Path::new("submission")], vec![Protocol::named("mateval-3")?]);
+/// let plan = ScorePlan::new(&dataset, submissions, protocols, LpipsWeights::Loaded(Box::new(lpips)), "my tool 1.0");
 /// for (key, value) in &score(&plan, &|_| ())?[0].protocols["mateval-3"].summary {
 ///     println!("{key} {value}");
 /// }
@@ -127,7 +107,12 @@ struct Outcome {
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
     plan.check()?;
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
-    check_finished(plan.dataset, &scenes)?;
+    // The light of a scene that was rendered apart since the manifest was written would silently not be scored.
+    let mut changed = BuildFolder::of(&plan.dataset.root).changed();
+    changed.retain(|id| scenes.iter().any(|scene| scene.id == *id));
+    if !changed.is_empty() {
+        return Err(SceneError::Unfinished { path: plan.dataset.root.clone(), scenes: changed }.into());
+    }
     plan.check_cached(&scenes)?;
     if let Some(absence) = plan.dataset.absence().filter(|_| plan.scenes.is_empty()) {
         progress(Report::Message(&absence));
@@ -145,17 +130,6 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     }
     let check = tracer_check(plan.dataset)?;
     Ok(entries.into_iter().map(|entry| finish(plan, &scenes, check.clone(), entry)).collect())
-}
-
-/// Fails where a scene was rendered apart since the manifest was written: its light would silently not be scored.
-fn check_finished(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), EvalError> {
-    let changed = BuildFolder::of(&dataset.root).changed();
-    let unfinished: Vec<SceneId> =
-        changed.into_iter().filter(|id| scenes.iter().any(|scene| scene.id == *id)).collect();
-    match unfinished.is_empty() {
-        true => Ok(()),
-        false => Err(SceneError::Unfinished { path: dataset.root.clone(), scenes: unfinished }.into()),
-    }
 }
 
 /// Outcomes by scene, then by submission. Scores several scenes at a time; the first failure ends the work.
@@ -210,7 +184,29 @@ fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) ->
     Ok(predictions.into_iter().zip(scores).map(outcome).collect())
 }
 
-impl ScorePlan<'_> {
+impl<'a> ScorePlan<'a> {
+    /// All scenes, one after the other, without a cache.
+    pub fn new(
+        dataset: &'a Dataset,
+        submissions: Vec<&'a Path>,
+        protocols: Vec<Protocol>,
+        lpips: LpipsWeights,
+        tool: impl Into<String>,
+    ) -> Self {
+        Self {
+            dataset,
+            submissions,
+            protocols,
+            scenes: Vec::new(),
+            lpips,
+            tool: tool.into(),
+            jobs: 1,
+            cache: None,
+            only_cached: false,
+            pictures: None,
+        }
+    }
+
     /// Fails if this scorer cannot follow a protocol, or LPIPS has another network.
     fn check(&self) -> Result<(), EvalError> {
         self.protocols.iter().try_for_each(Protocol::check)?;
@@ -258,11 +254,17 @@ impl ScorePlan<'_> {
         }
         let renderer = self.dataset.photo_renderer(scene).filter(|_| has(Track::Fitted));
         if let Some(renderer) = renderer {
-            check_photos(self.dataset, scene, renderer)?;
+            // Numbers carry the dataset's fingerprint, so the photos must be those that it covers.
+            let folder = format!("ground_truth/renders/{renderer}/");
+            self.dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?;
         }
         let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene)?;
-        let folders: Option<Vec<PathBuf>> = self.pictures.map(|root| self.picture_folders(root));
-        let pictures = folders.as_ref().map(|folders| PicturesDir { folders });
+        let folder_of = |root: &Path, at: usize| match self.submissions.len() {
+            1 => root.to_owned(),
+            _ => root.join(at.to_string()),
+        };
+        let folders = |root| (0..self.submissions.len()).map(|at| folder_of(root, at)).collect();
+        let pictures = self.pictures.map(|root| PicturesDir { folders: folders(root) });
         score_scene(&SceneTask {
             dataset: &self.dataset.root,
             scene,
@@ -279,14 +281,6 @@ impl ScorePlan<'_> {
             pictures: pictures.as_ref(),
             progress,
         })
-    }
-
-    /// The folder of each submission's pictures.
-    fn picture_folders(&self, root: &Path) -> Vec<PathBuf> {
-        match self.submissions.as_slice() {
-            [_] => vec![root.to_owned()],
-            several => (0..several.len()).map(|at| root.join(at.to_string())).collect(),
-        }
     }
 
     /// The cache's file for a scene's scores under a protocol, named after the hash of everything that they depend on.
@@ -313,12 +307,10 @@ impl ScorePlan<'_> {
         prediction: &PredictedScene,
         scores: &[SceneScore],
     ) -> Result<(), EvalError> {
-        let Some(folder) = self.cache else { return Ok(()) };
-        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         for (protocol, score) in self.protocols.iter().zip(scores) {
-            if let Some(path) = self.cache_file(scene, prediction, protocol) {
-                json::write(&path, score)?;
-            }
+            let (Some(folder), Some(path)) = (self.cache, self.cache_file(scene, prediction, protocol)) else { break };
+            std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+            json::write(&path, score)?;
         }
         Ok(())
     }
@@ -350,13 +342,29 @@ fn finish(
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
     let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
-    let lost = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| lost_light(protocol, scores));
-    entry.findings.extend(lost);
+    for (protocol, scores) in plan.protocols.iter().zip(&entry.scores) {
+        for (scene, score) in scores.iter().filter(|(_, score)| score.not_finite > 0) {
+            let message =
+                format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite);
+            let action = "they count as no light; please report this submission";
+            let file = format!("scenes/{scene}");
+            entry.findings.push(Finding::new(Severity::Warning, "not_finite_light", file, "", message, action));
+        }
+    }
     if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
-        entry.findings.extend(scored.iter().filter(|scene| scene.photo.is_some()).map(|scene| unknown_light(scene)));
+        for scene in scored.iter().filter(|scene| scene.photo.is_some()) {
+            let file = format!("scenes/{}/scene.json", scene.id);
+            let message = "the input picture is a photo from elsewhere, and the true light of the scene is not known";
+            let action = "scored its materials and not its light";
+            entry.findings.push(Finding::new(Severity::Note, "unknown_light", file, "/photo", message, action));
+        }
     }
     let not_predicted = not_predicted(&entry.files);
-    entry.findings.extend(not_predicted.iter().map(|map| not_predicted_finding(*map)));
+    for map in &not_predicted {
+        let message = format!("the submission holds no {} of any scored instance", map.stem());
+        let action = "it has no value; under light it is rendered as the default";
+        entry.findings.push(Finding::new(Severity::Note, "not_predicted", SUBMISSION, "", message, action));
+    }
     let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
         let fingerprint = protocol.fingerprint(manifest, &ids, weights);
         (protocol.name.clone(), protocol_result(protocol, fingerprint, scores, &not_predicted))
@@ -428,34 +436,6 @@ fn tracer_check(dataset: &Dataset) -> Result<Option<TracerCheck>, EvalError> {
     }))
 }
 
-/// The finding about a scene with a photo from elsewhere.
-fn unknown_light(scene: &SceneFile) -> Finding {
-    Finding::new(
-        Severity::Note,
-        "unknown_light",
-        format!("scenes/{}/scene.json", scene.id),
-        "/photo",
-        "the input picture is a photo from elsewhere, and the true light of the scene is not known",
-        "scored its materials and not its light",
-    )
-}
-
-/// A finding for each scene in which some of the prediction's light was not finite.
-fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Finding> {
-    let lost = scores.iter().filter(|(_, score)| score.not_finite > 0);
-    lost.map(|(scene, score)| {
-        Finding::new(
-            Severity::Warning,
-            "not_finite_light",
-            format!("scenes/{scene}"),
-            "",
-            format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite),
-            "they count as no light; please report this submission",
-        )
-    })
-    .collect()
-}
-
 /// The maps that a submission's files do not contain.
 fn not_predicted(files: &[HashedFile]) -> Vec<Map> {
     let is_of = |file: &HashedFile, map: Map| {
@@ -463,17 +443,6 @@ fn not_predicted(files: &[HashedFile]) -> Vec<Map> {
         name.split_once('.').is_some_and(|(stem, _)| stem == map.stem())
     };
     Map::ALL.into_iter().filter(|map| !files.iter().any(|file| is_of(file, *map))).collect()
-}
-
-fn not_predicted_finding(map: Map) -> Finding {
-    Finding::new(
-        Severity::Note,
-        "not_predicted",
-        SUBMISSION,
-        "",
-        format!("the submission holds no {} of any scored instance", map.stem()),
-        "it has no value; under light it is rendered as the default",
-    )
 }
 
 /// The metrics that lack weights or renders.
@@ -492,7 +461,7 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
         tracks.dedup();
         tracks.retain(|track| match track {
             Track::Fitted => plan.dataset.file.photo_renderer.is_none(),
-            Track::True | Track::Relit => !has_references(plan.dataset),
+            _ => !has_references(plan.dataset),
         });
         missing.extend(tracks.into_iter().map(|track| MissingMetric {
             metric: MissingNumbers::Picture(track.picture()),

@@ -21,7 +21,6 @@ use crate::truth::ViewTruth;
 
 /// The truth and every submission's albedo of one view, linear.
 pub struct SceneAlbedo {
-    /// The truth's pictures and masks.
     pub truth: ViewTruth,
     /// One for each submission, in the given order.
     pub predicted: Vec<Picture<LinearRgb>>,
@@ -54,7 +53,6 @@ fn predictions_of(
 
 /// The truth's light and every submission's of one view, clipped and encoded for display.
 pub struct SceneLight {
-    /// The truth's pictures and masks.
     pub truth: ViewTruth,
     /// What submissions are compared with.
     pub reference: Picture<SrgbRgb>,

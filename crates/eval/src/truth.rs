@@ -1,5 +1,7 @@
 //! The ground truth of a scene: its maps, read as a prediction's would be, and the pictures and masks of its views.
 
+use std::path::PathBuf;
+
 use mateval_dataset::dataset::{Instance, SceneFile, View};
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::submission::Map;
@@ -12,13 +14,11 @@ use crate::error::EvalError;
 
 /// A view's true maps and its masks.
 pub struct ViewTruth {
-    /// base_color, linear.
     pub albedo: Picture<LinearRgb>,
     /// Perceptual, 0 to 1.
     pub roughness: Picture<f32>,
     /// 0 to 1.
     pub metallic: Picture<f32>,
-    /// The pixels that are scored.
     pub valid: Mask,
     /// Valid pixels that the input view does not see; none for the input view.
     pub unobserved: Option<Mask>,
@@ -34,35 +34,26 @@ impl ViewTruth {
     /// Reads a view's maps and masks. Fails where one is missing, unreadable or not of the camera's size.
     pub fn read(folder: &SceneFolder, view: &View) -> Result<Self, EvalError> {
         let (shown, hidden) = (folder.view(&view.id), folder.truth_view(&view.id));
-        let valid = png_io::read_mask(&shown.join("valid.png"))?;
-        let is_input = view.id.as_str() == INPUT;
-        let unobserved = (!is_input).then(|| png_io::read_mask(&shown.join("unobserved.png"))).transpose()?;
-        let truth = Self {
-            albedo: exr_io::read_linear(&hidden.join("albedo.exr"))?,
-            roughness: exr_io::read_scalar(&hidden.join("roughness.exr"))?,
-            metallic: exr_io::read_scalar(&hidden.join("metallic.exr"))?,
-            specular: None,
-            instances: png_io::read_ids(&shown.join("instance.png"))?,
-            normals: exr_io::read_normal(&shown.join("normal.exr"))?,
-            unobserved,
-            valid,
-        };
-        let specular = png_io::read_mask(&hidden.join("specular_region.png"))?;
-        let sizes = [
-            size(&truth.albedo),
-            size(&truth.roughness),
-            size(&truth.metallic),
-            size(&truth.valid),
-            truth.unobserved.as_ref().map_or(size(&truth.valid), size),
-            size(&truth.instances),
-            size(&truth.normals),
-            size(&specular),
-        ];
-        check_sizes(view, &sizes)?;
+        let mask = |path: PathBuf| sized(view, png_io::read_mask(&path)?);
+        let scalar = |name: &str| sized(view, exr_io::read_scalar(&hidden.join(name))?);
+        let valid = mask(shown.join("valid.png"))?;
         // Masks of untrusted datasets may hold more than the valid pixels.
-        let both = intersection(&specular, &truth.valid);
-        let unobserved = truth.unobserved.as_ref().map(|mask| intersection(mask, &truth.valid));
-        Ok(Self { specular: both.pixels().contains(&true).then_some(both), unobserved, ..truth })
+        let of_valid = |path| {
+            let all = mask(path)?;
+            Ok::<_, EvalError>(Mask::from_fn(all.width(), all.height(), |x, y| all.get(x, y) && valid.get(x, y)))
+        };
+        let is_input = view.id.as_str() == INPUT;
+        let specular = of_valid(hidden.join("specular_region.png"))?;
+        Ok(Self {
+            albedo: sized(view, exr_io::read_linear(&hidden.join("albedo.exr"))?)?,
+            roughness: scalar("roughness.exr")?,
+            metallic: scalar("metallic.exr")?,
+            unobserved: (!is_input).then(|| of_valid(shown.join("unobserved.png"))).transpose()?,
+            specular: specular.pixels().contains(&true).then_some(specular),
+            instances: sized(view, png_io::read_ids(&shown.join("instance.png"))?)?,
+            normals: sized(view, exr_io::read_normal(&shown.join("normal.exr"))?)?,
+            valid,
+        })
     }
 }
 
@@ -72,31 +63,21 @@ pub fn photo_of_renderer(
     renderer: &RendererId,
     view: &View,
 ) -> Result<Picture<LinearRgb>, EvalError> {
-    let picture = exr_io::read_linear(&folder.render(renderer, &view.id).join("rgb.exr"))?;
-    check_sizes(view, &[size(&picture)])?;
-    Ok(picture)
+    sized(view, exr_io::read_linear(&folder.render(renderer, &view.id).join("rgb.exr"))?)
 }
 
-/// The pixels where both masks are set. The masks have the same size.
-fn intersection(a: &Mask, b: &Mask) -> Mask {
-    Mask::from_fn(a.width(), a.height(), |x, y| a.get(x, y) && b.get(x, y))
-}
-
-fn size<T: Copy>(picture: &Picture<T>) -> (usize, usize) {
-    (picture.width(), picture.height())
-}
-
-/// Fails where a picture is not of the camera's size.
-pub(crate) fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), EvalError> {
+/// The picture; fails where it is not of the camera's size.
+pub(crate) fn sized<T: Copy>(view: &View, picture: Picture<T>) -> Result<Picture<T>, EvalError> {
     let expected = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
-    match sizes.iter().find(|found| **found != expected) {
-        None => Ok(()),
-        Some(found) => Err(EvalError::Unsound {
-            place: format!("view '{}'", view.id),
-            expected: format!("pictures of {}x{} pixels, the camera's size", expected.0, expected.1),
-            found: format!("{}x{}", found.0, found.1),
-        }),
+    let found = (picture.width(), picture.height());
+    if found == expected {
+        return Ok(picture);
     }
+    Err(EvalError::Unsound {
+        place: format!("view '{}'", view.id),
+        expected: format!("pictures of {}x{} pixels, the camera's size", expected.0, expected.1),
+        found: format!("{}x{}", found.0, found.1),
+    })
 }
 
 /// The true maps of an instance: its source's material baked to its atlas of `size` times `size` texels, with the
@@ -104,26 +85,24 @@ pub(crate) fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), E
 ///
 /// Fails where a file of `ground_truth/materials/<instance>/` is missing, unsound or of another size.
 pub fn true_material(folder: &SceneFolder, instance: &InstanceId, size: usize) -> Result<PredictedMaterial, EvalError> {
-    let read = |map: Map| read_truth(folder, instance, map, size);
+    let read = |map: Map| {
+        let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
+        let png = folder.truth_material(instance).join(map.stem()).with_extension("png");
+        let texture = read_texture(&png, encoding, Wrap::Clamp)?;
+        if (texture.width(), texture.height()) == (size, size) {
+            return Ok(texture.collapsed());
+        }
+        Err(EvalError::Unsound {
+            place: format!("'{}'", png.display()),
+            expected: format!("{size}x{size} texels, as scene.json states"),
+            found: format!("{}x{}", texture.width(), texture.height()),
+        })
+    };
     // A submission's constant scalar is one float.
     let compact = |map: Texture| if map.width() == 1 { one_texel(map.texel(0, 0)[0]) } else { map };
     let ((base_color, roughness), metallic) =
         rayon::join(|| rayon::join(|| read(Map::BaseColor), || read(Map::Roughness)), || read(Map::Metallic));
     Ok(PredictedMaterial { base_color: base_color?, roughness: compact(roughness?), metallic: compact(metallic?) })
-}
-
-fn read_truth(folder: &SceneFolder, instance: &InstanceId, map: Map, size: usize) -> Result<Texture, EvalError> {
-    let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
-    let png = folder.truth_material(instance).join(map.stem()).with_extension("png");
-    let texture = read_texture(&png, encoding, Wrap::Clamp)?;
-    if (texture.width(), texture.height()) == (size, size) {
-        return Ok(texture.collapsed());
-    }
-    Err(EvalError::Unsound {
-        place: format!("'{}'", png.display()),
-        expected: format!("{size}x{size} texels, as scene.json states"),
-        found: format!("{}x{}", texture.width(), texture.height()),
-    })
 }
 
 /// All true maps of a scene.

@@ -15,8 +15,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::EvalError;
+use crate::metric::{LPIPS_NET, Metric};
 use crate::protocol::Protocol;
-use crate::result::key::{LPIPS_NET, Metric, ResultKey};
+use crate::result::key::ResultKey;
 use crate::result::means::{means, summary_noise};
 use crate::result::{MissingNumbers, RESULT_FORMAT, ResultFile};
 use crate::score::{LpipsWeights, ScorePlan, score};
@@ -46,7 +47,6 @@ pub struct VerificationFile {
     pub findings: Vec<Finding>,
 }
 
-/// What to verify.
 pub struct VerifyPlan<'a> {
     pub result: &'a Path,
     /// The submission folder that it states.
@@ -90,65 +90,54 @@ pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<Verificati
     // The verdict lies outside the dataset's identity and may have been made or changed since.
     again.tracer_check.clone_from(&result.tracer_check);
     let found = differences(&to_value(&result), &to_value(&again));
-    let findings = found.iter().take(MOST_LISTED).map(|difference| finding(&name, difference)).collect();
+    let finding = |Difference { place, said, found }: &Difference| {
+        let message = format!("the result states {said}, computed again it is {found}");
+        let action = "the result was changed, or made by another version; score it again";
+        Finding::new(Severity::Error, "differs", &name, place, message, action)
+    };
+    let findings = found.iter().take(MOST_LISTED).map(finding).collect();
     Ok(VerificationFile { confirmed: found.is_empty(), differences: found.len(), findings, ..verification })
 }
 
 fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_>) -> Result<ResultFile, EvalError> {
     let protocols = result.protocols.keys().map(|name| Protocol::named(name)).collect::<Result<_, _>>()?;
-    let plan = ScorePlan {
-        dataset: plan.dataset,
-        submissions: vec![plan.submission],
-        protocols,
-        scenes: result.dataset.scenes.clone(),
-        lpips: as_in_the_result(plan.lpips, result),
-        // Versions are compared by the version of the rules.
-        tool: result.tool.clone(),
-        jobs: plan.jobs,
-        cache: None,
-        only_cached: false,
-        pictures: None,
-    };
-    Ok(score(&plan, progress)?.remove(0))
-}
-
-/// A result without LPIPS is computed again without it.
-fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
-    match result.missing.iter().find(|missing| missing.metric == MissingNumbers::Metric(Metric::LpipsAlex)) {
+    // A result without LPIPS is computed again without it.
+    let without = MissingNumbers::Metric(Metric::LpipsAlex);
+    let lpips = match result.missing.iter().find(|missing| missing.metric == without) {
         Some(missing) => LpipsWeights::Missing { reason: missing.reason.clone(), fix: missing.fix.clone() },
-        None => lpips,
-    }
+        None => plan.lpips,
+    };
+    // Versions are compared by the version of the rules.
+    let again = ScorePlan::new(plan.dataset, vec![plan.submission], protocols, lpips, &result.tool);
+    let plan = ScorePlan { scenes: result.dataset.scenes.clone(), jobs: plan.jobs, ..again };
+    Ok(score(&plan, progress)?.remove(0))
 }
 
 fn to_value(value: impl Serialize) -> Value {
     serde_json::to_value(value).expect("our types can be written as JSON")
 }
 
-fn finding(file: &str, difference: &Difference) -> Finding {
-    Finding::new(
-        Severity::Error,
-        "differs",
-        file,
-        difference.place.clone(),
-        format!("the result states {}, computed again it is {}", difference.said, difference.found),
-        "the result was changed, or made by another version; score it again",
-    )
-}
-
 /// Everything that has changed; numbers are computed again only if this is empty. Fails if the result holds LPIPS and
 /// its weights are missing.
 fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>, EvalError> {
     let name = file_name(plan.result);
-    let finding = |code: &str, place: &str, message: String, action: &str| Finding {
-        severity: Severity::Error,
-        code: code.to_owned(),
-        file: name.clone(),
-        place: place.to_owned(),
-        message,
-        action: action.to_owned(),
+    let finding = |code: &str, place: &str, message: String, action: &str| {
+        Finding::new(Severity::Error, code, &name, place, message, action)
     };
     let mut findings = Vec::new();
-    findings.extend(rules(result, &finding));
+    for (name, scores) in &result.protocols {
+        let place = format!("/protocols/{name}/protocol");
+        let Ok(known) = Protocol::named(name) else {
+            let message = format!("there is no protocol '{name}' in this version");
+            findings.push(finding("other_protocol", &place, message, "verify it with the version that made it"));
+            continue;
+        };
+        for difference in differences(&to_value(&scores.protocol), &to_value(&known)) {
+            let message = format!("the result states {}; protocol '{name}' has {}", difference.said, difference.found);
+            let place = format!("{place}{}", difference.place);
+            findings.push(finding("other_protocol", &place, message, "score it again by the published rules"));
+        }
+    }
     let (said, found) = (&result.dataset.manifest_sha256, &plan.dataset.file.manifest_sha256);
     if said != found {
         let message = format!("made on a dataset with manifest {said}; this one's is {found}");
@@ -165,48 +154,21 @@ fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>,
             findings.push(finding("other_submission", "/submission/sha256", message, action));
         }
     }
-    findings.extend(weights(plan, result, &finding)?);
+    if let Some(said) = result.lpips_weights.get(LPIPS_NET.name()).and_then(Option::as_ref) {
+        match &plan.lpips {
+            LpipsWeights::Missing { reason, fix } => {
+                return Err(EvalError::LpipsWeights { reason: reason.clone(), fix: fix.clone() });
+            }
+            LpipsWeights::Loaded(lpips) if lpips.sha256() == said => {}
+            LpipsWeights::Loaded(lpips) => {
+                let message = format!("made with weights {said}; those here are {}", lpips.sha256());
+                let action = "fetch the published weights: mateval fetch lpips";
+                findings.push(finding("other_weights", "/lpips_weights/alex", message, action));
+            }
+        }
+    }
     findings.sort();
     Ok(findings)
-}
-
-type MakeFinding<'a> = dyn Fn(&str, &str, String, &str) -> Finding + 'a;
-
-fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    for (name, scores) in &result.protocols {
-        let place = format!("/protocols/{name}/protocol");
-        let Ok(known) = Protocol::named(name) else {
-            let message = format!("there is no protocol '{name}' in this version");
-            findings.push(finding("other_protocol", &place, message, "verify it with the version that made it"));
-            continue;
-        };
-        for difference in differences(&to_value(&scores.protocol), &to_value(&known)) {
-            let message = format!("the result states {}; protocol '{name}' has {}", difference.said, difference.found);
-            let place = format!("{place}{}", difference.place);
-            findings.push(finding("other_protocol", &place, message, "score it again by the published rules"));
-        }
-    }
-    findings
-}
-
-fn weights(
-    plan: &VerifyPlan<'_>,
-    result: &ResultFile,
-    finding: &MakeFinding<'_>,
-) -> Result<Option<Finding>, EvalError> {
-    let Some(said) = result.lpips_weights.get(LPIPS_NET.name()).and_then(Option::as_ref) else { return Ok(None) };
-    match &plan.lpips {
-        LpipsWeights::Missing { reason, fix } => {
-            Err(EvalError::LpipsWeights { reason: reason.clone(), fix: fix.clone() })
-        }
-        LpipsWeights::Loaded(lpips) if lpips.sha256() == said => Ok(None),
-        LpipsWeights::Loaded(lpips) => {
-            let message = format!("made with weights {said}; those here are {}", lpips.sha256());
-            let action = "fetch the published weights: mateval fetch lpips";
-            Ok(Some(finding("other_weights", "/lpips_weights/alex", message, action)))
-        }
-    }
 }
 
 impl ResultFile {
@@ -241,33 +203,23 @@ impl ResultFile {
 
 /// Two values at one place that are not the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Difference {
-    pub(crate) place: String,
-    pub(crate) said: String,
-    pub(crate) found: String,
+struct Difference {
+    place: String,
+    said: String,
+    found: String,
 }
 
 /// All differences, in the order of places. Numbers must be the same to the last bit, or within their metric's
-/// [`Metric::tolerance`].
-pub(crate) fn differences(said: &Value, found: &Value) -> Vec<Difference> {
+/// tolerance.
+fn differences(said: &Value, found: &Value) -> Vec<Difference> {
     let mut differences = Vec::new();
-    compare(said, found, &Place { pointer: String::new(), tolerance: 0.0 }, &mut differences);
+    compare(said, found, "", 0.0, &mut differences);
     differences
 }
 
-struct Place {
-    pointer: String,
-    tolerance: f64,
-}
-
-impl Place {
-    fn below(&self, key: &str, tolerance: f64) -> Self {
-        let escaped = key.replace('~', "~0").replace('/', "~1");
-        Self { pointer: format!("{}/{escaped}", self.pointer), tolerance }
-    }
-}
-
-fn compare(said: &Value, found: &Value, place: &Place, differences: &mut Vec<Difference>) {
+/// `place` is a JSON pointer.
+fn compare(said: &Value, found: &Value, place: &str, tolerance: f64, differences: &mut Vec<Difference>) {
+    let below = |key: &str| format!("{place}/{}", key.replace('~', "~0").replace('/', "~1"));
     match (said, found) {
         (Value::Object(a), Value::Object(b)) => {
             let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
@@ -276,17 +228,18 @@ fn compare(said: &Value, found: &Value, place: &Place, differences: &mut Vec<Dif
             for key in keys {
                 // A mean by its key, or a picture's value by its metric.
                 let metric = key.parse::<ResultKey>().map(|key| key.metric).or_else(|_| key.parse()).ok();
-                let pair = [a, b].map(|map| map.get(key).unwrap_or(&Value::Null));
-                compare(pair[0], pair[1], &place.below(key, metric.map_or(0.0, Metric::tolerance)), differences);
+                let [a, b] = [a, b].map(|map| map.get(key).unwrap_or(&Value::Null));
+                let tolerance = metric.map_or(0.0, Metric::tolerance);
+                compare(a, b, &below(key), tolerance, differences);
             }
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
             for (at, (a, b)) in a.iter().zip(b).enumerate() {
-                compare(a, b, &place.below(&at.to_string(), 0.0), differences);
+                compare(a, b, &below(&at.to_string()), 0.0, differences);
             }
         }
-        _ if same(said, found, place.tolerance) => {}
-        _ => differences.push(Difference { place: place.pointer.clone(), said: short(said), found: short(found) }),
+        _ if same(said, found, tolerance) => {}
+        _ => differences.push(Difference { place: place.to_owned(), said: short(said), found: short(found) }),
     }
 }
 

@@ -4,7 +4,7 @@
 //! number, or `None` where no pixel (or no window) counts. The type of a picture is its colour space, and this crate
 //! changes no colours: the caller clips to 0..1 and encodes to sRGB. Only [`delta_e()`] and [`flip()`] clip as well.
 //!
-//! [`mse()`], [`Psnr`] and [`delta_e()`] (CIEDE2000) compare pixels, [`mod@ssim`] compares 11x11 windows (Wang et al.
+//! [`mse()`], [`mae()`], [`Psnr`] and [`delta_e()`] (CIEDE2000) compare pixels, [`mod@ssim`] compares 11x11 windows (Wang et al.
 //! 2004), [`flip()`] compares what an observer sees at a distance (Andersson et al. 2020), and [`lpips`] compares the
 //! responses of two trained networks (Zhang et al. 2018). The windows and filters of the last three reach across the
 //! mask's edge: [`pixel`] holds the two ways to fill the pixels outside. FLIP has the reference's there, and SSIM and
@@ -26,6 +26,6 @@ pub mod ssim;
 pub use delta_e::delta_e;
 pub use flip::{flip, flip_map};
 pub use lpips::{Features, Lpips, Net};
-pub use mse::{Psnr, mse};
+pub use mse::{Psnr, mae, mse};
 pub use pixel::{MetricError, Pixel};
-pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};
+pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_valid_windows};

@@ -6,8 +6,8 @@ use mateval_image::{Mask, Picture, SrgbRgb};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::pixel::pixel_count;
-use crate::{Features, Lpips, MaskedSsim, MetricError, Pixel, ssim_black_fill, ssim_valid_windows};
+use crate::pixel::{black_filled, pixel_count};
+use crate::{Features, Lpips, MetricError, Pixel, ssim_black_fill, ssim_valid_windows};
 
 /// What metrics whose windows look across a mask's edge do outside the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -32,7 +32,9 @@ impl MaskRule {
     ) -> Result<Counted, MetricError> {
         Ok(match self {
             Self::BlackFill => (ssim_black_fill(prediction, reference, mask)?, pixel_count(mask)),
-            Self::Inside => windows(ssim_valid_windows(prediction, reference, mask)?),
+            Self::Inside => {
+                ssim_valid_windows(prediction, reference, mask)?.map_or((None, 0), |s| (Some(s.ssim), s.windows))
+            }
         })
     }
 
@@ -45,31 +47,19 @@ impl MaskRule {
         features: &ReferenceFeatures,
         mask: &Mask,
     ) -> Result<Option<f64>, MetricError> {
-        match (self.features(lpips, reference, features, mask)?, self) {
+        if pixel_count(mask) == 0 {
+            return Ok(None);
+        }
+        let features = match self {
+            Self::BlackFill => features.of(Some(mask), || lpips.features(&black_filled(reference, mask)?)),
+            Self::Inside => features.of(None, || lpips.features(reference)),
+        };
+        match (features?, self) {
             (None, _) => Ok(None),
-            (Some(features), Self::BlackFill) => lpips.black_fill_from(prediction, &features, mask),
-            (Some(features), Self::Inside) => lpips.masked_from(prediction, &features, mask),
+            (Some(features), Self::BlackFill) => lpips.black_fill(prediction, &features, mask),
+            (Some(features), Self::Inside) => lpips.inside(prediction, &features, mask),
         }
     }
-
-    /// The features of the reference that predictions are compared with; none where nothing counts or it is too small.
-    fn features(
-        self,
-        lpips: &Lpips,
-        reference: &Picture<SrgbRgb>,
-        features: &ReferenceFeatures,
-        mask: &Mask,
-    ) -> Result<Option<Arc<Features>>, MetricError> {
-        match self {
-            _ if pixel_count(mask) == 0 => Ok(None),
-            Self::BlackFill => features.black_filled(lpips, reference, mask),
-            Self::Inside => features.whole(lpips, reference),
-        }
-    }
-}
-
-fn windows(inside: Option<MaskedSsim>) -> Counted {
-    (inside.as_ref().map(|inside| inside.ssim), inside.map_or(0, |inside| inside.windows))
 }
 
 /// The features of one reference picture, whole and with black outside of masks, as far as they have been asked for.
@@ -77,22 +67,8 @@ fn windows(inside: Option<MaskedSsim>) -> Counted {
 pub struct ReferenceFeatures(Mutex<Vec<(Option<Mask>, Arc<Features>)>>);
 
 impl ReferenceFeatures {
-    /// Those of the whole reference; absent if it is too small for the network. The reference is the same at every
-    /// call.
-    pub fn whole(&self, lpips: &Lpips, reference: &Picture<SrgbRgb>) -> Result<Option<Arc<Features>>, MetricError> {
-        self.of(None, || lpips.features(reference))
-    }
-
-    /// Those of the reference with black outside the mask.
-    pub fn black_filled(
-        &self,
-        lpips: &Lpips,
-        reference: &Picture<SrgbRgb>,
-        mask: &Mask,
-    ) -> Result<Option<Arc<Features>>, MetricError> {
-        self.of(Some(mask), || lpips.black_filled_features(reference, mask))
-    }
-
+    /// Those of the whole reference, or of the reference with black outside the mask; absent if it is too small for the
+    /// network. The reference is the same at every call.
     fn of(
         &self,
         mask: Option<&Mask>,

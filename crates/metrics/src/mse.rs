@@ -1,4 +1,4 @@
-//! The mean squared error, and the peak signal-to-noise ratio, which follows from it.
+//! The mean squared error, the peak signal-to-noise ratio, which follows from it, and the mean absolute error.
 
 use mateval_image::{Mask, Picture};
 
@@ -27,20 +27,35 @@ pub fn mse<P: Pixel>(
     reference: &Picture<P>,
     mask: Option<&Mask>,
 ) -> Result<Option<f64>, MetricError> {
+    mean(prediction, reference, mask, |difference| difference.powi(2))
+}
+
+/// The mean of |prediction - reference|, as [`mse`].
+pub fn mae<P: Pixel>(
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    mask: Option<&Mask>,
+) -> Result<Option<f64>, MetricError> {
+    mean(prediction, reference, mask, f64::abs)
+}
+
+fn mean<P: Pixel>(
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    mask: Option<&Mask>,
+    error: impl Fn(f64) -> f64,
+) -> Result<Option<f64>, MetricError> {
     check_pair(prediction, reference, mask)?;
     let (mut sum, mut count) = (0.0_f64, 0_usize);
     for (index, (p, r)) in prediction.pixels().iter().zip(reference.pixels()).enumerate() {
         if mask.is_none_or(|mask| mask.pixels()[index]) {
-            sum += squared_difference(*p, *r);
+            let pairs = p.channels().iter().zip(r.channels());
+            // By pixel first: a sum in another order has other last bits.
+            sum += pairs.map(|(&p, &r)| error(f64::from(p) - f64::from(r))).sum::<f64>();
             count += p.channels().len();
         }
     }
     Ok((count > 0).then(|| sum / count as f64))
-}
-
-fn squared_difference<P: Pixel>(p: P, r: P) -> f64 {
-    let pairs = p.channels().iter().zip(r.channels());
-    pairs.map(|(&p, &r)| (f64::from(p) - f64::from(r)).powi(2)).sum()
 }
 
 /// 10 log10(1 / MSE) decibels for values whose peak is 1, capped at [`Psnr::CAP_DB`]. Higher is better.

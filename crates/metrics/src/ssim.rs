@@ -11,9 +11,7 @@ use mateval_image::{Mask, Picture};
 use rayon::prelude::*;
 
 use crate::MetricError;
-use crate::pixel::Size;
-use crate::pixel::{Pixel, check_finite, check_pair, check_sizes, size_of};
-use crate::pixel::{black_filled, pixel_count};
+use crate::pixel::{Pixel, black_filled, check_pair, pixel_count, size_of};
 
 /// Pixels from a window's centre to its edge.
 const RADIUS: usize = 5;
@@ -25,8 +23,8 @@ pub const SIGMA: f64 = 1.5;
 pub const K1: f64 = 0.01;
 /// The constant that stabilises the comparison of variances.
 pub const K2: f64 = 0.03;
-pub(crate) const C1: f64 = K1 * K1;
-pub(crate) const C2: f64 = K2 * K2;
+const C1: f64 = K1 * K1;
+const C2: f64 = K2 * K2;
 
 /// SSIM over the windows that lie wholly inside a mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,12 +39,8 @@ pub struct MaskedSsim {
 ///
 /// Fails if sizes differ, a side is below 11 pixels or a value is not finite.
 pub fn ssim<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<f64, MetricError> {
-    Ok(mean(&ssim_map(prediction, reference)?))
-}
-
-/// The mean over all windows.
-pub(crate) fn mean(map: &Picture<f64>) -> f64 {
-    map.pixels().iter().sum::<f64>() / map.pixels().len() as f64
+    let map = ssim_map(prediction, reference)?;
+    Ok(map.pixels().iter().sum::<f64>() / map.pixels().len() as f64)
 }
 
 /// [`ssim`] of both pictures with black outside the mask, averaged over the whole picture (protocol `paper`). The
@@ -72,36 +66,27 @@ pub fn ssim_valid_windows<P: Pixel>(
     check_pair(prediction, reference, Some(mask))?;
     // No valid window reaches the filling; it replaces values that may be NaN.
     let map = ssim_map(&black_filled(prediction, mask)?, &black_filled(reference, mask)?)?;
-    Ok(mean_of_valid(&map, mask))
-}
-
-/// The mean over those windows of the map that lie wholly inside the mask.
-pub(crate) fn mean_of_valid(map: &Picture<f64>, mask: &Mask) -> Option<MaskedSsim> {
     let (mut sum, mut windows) = (0.0, 0);
     for (value, _) in map.pixels().iter().zip(valid_windows(mask)).filter(|&(_, valid)| valid) {
         sum += value;
         windows += 1;
     }
-    (windows > 0).then(|| MaskedSsim { ssim: sum / windows as f64, windows })
+    Ok((windows > 0).then(|| MaskedSsim { ssim: sum / windows as f64, windows }))
 }
 
 /// The index of every window, averaged over channels. The map is 10 pixels narrower and lower than the pictures; its
 /// pixel (x, y) is the index of the window around (x + 5, y + 5). Fails as [`ssim`] does.
-pub fn ssim_map<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<Picture<f64>, MetricError> {
-    check_sizes(prediction, reference, None)?;
-    check_window_fits(size_of(prediction))?;
-    check_finite("prediction", prediction, None)?;
-    check_finite("reference", reference, None)?;
+fn ssim_map<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<Picture<f64>, MetricError> {
+    check_pair(prediction, reference, None)?;
+    let found = size_of(prediction);
+    if found.0.min(found.1) < WINDOW {
+        return Err(MetricError::TooSmall { metric: "ssim", least: WINDOW, found });
+    }
     Ok(map_with(prediction, reference, &gaussian(SIGMA)))
 }
 
-pub(crate) fn check_window_fits(found: Size) -> Result<(), MetricError> {
-    let fits = found.0 >= WINDOW && found.1 >= WINDOW;
-    if fits { Ok(()) } else { Err(MetricError::TooSmall { metric: "ssim", least: WINDOW, found }) }
-}
-
 /// The window's weights along one axis; their sum is 1.
-pub(crate) fn gaussian(sigma: f64) -> [f64; WINDOW] {
+fn gaussian(sigma: f64) -> [f64; WINDOW] {
     let weights: [f64; WINDOW] = std::array::from_fn(|i| {
         let distance = i as f64 - RADIUS as f64;
         libm::exp(-0.5 * distance * distance / (sigma * sigma))
@@ -110,31 +95,30 @@ pub(crate) fn gaussian(sigma: f64) -> [f64; WINDOW] {
     weights.map(|weight| weight / sum)
 }
 
+/// The weighted means of p, r, p², r² and pr over a window or a part of it.
+type Moments = [f64; 5];
+
 /// The map of two pictures under the given window.
 fn map_with<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &[f64; WINDOW]) -> Picture<f64> {
+    let (width, height) = size_of(prediction);
     let channels = P::default().channels().len();
-    let terms = |pixel: usize, channel: usize| {
-        let [p, r] = [prediction, reference].map(|picture| f64::from(picture.pixels()[pixel].channels()[channel]));
-        [p, r, p * p, r * r, p * r]
-    };
-    windows_map(size_of(prediction), channels, window, terms, index)
-}
-
-/// For each window inside a picture of this size, `index` of its moments, averaged over channels. The moments are the
-/// weighted means of `terms(pixel, channel)`, where `pixel` is an index of [`Picture::pixels`].
-pub(crate) fn windows_map<const TERMS: usize>(
-    (width, height): Size,
-    channels: usize,
-    window: &[f64; WINDOW],
-    terms: impl Fn(usize, usize) -> [f64; TERMS] + Sync,
-    index: impl Fn(&[f64; TERMS]) -> f64 + Sync,
-) -> Picture<f64> {
     let row = |y: usize| {
         let mut row = vec![0.0; width - 2 * RADIUS];
         for channel in 0..channels {
-            let columns = column_moments(width, y, window, |pixel| terms(pixel, channel));
+            // The moments of each column of 11 pixels that starts at this row.
+            let mut columns = vec![Moments::default(); width];
+            for (dy, weight) in window.iter().enumerate() {
+                for (x, sums) in columns.iter_mut().enumerate() {
+                    let pixel = (y + dy) * width + x;
+                    let value = |picture: &Picture<P>| f64::from(picture.pixels()[pixel].channels()[channel]);
+                    let [p, r] = [value(prediction), value(reference)];
+                    add_weighted(sums, *weight, &[p, r, p * p, r * r, p * r]);
+                }
+            }
             for (x, value) in row.iter_mut().enumerate() {
-                *value += index(&window_moments(&columns[x..x + WINDOW], window));
+                let mut sums = Moments::default();
+                columns[x..].iter().zip(window).for_each(|(column, weight)| add_weighted(&mut sums, *weight, column));
+                *value += index(&sums);
             }
         }
         row.iter_mut().for_each(|value| *value /= channels as f64);
@@ -145,34 +129,12 @@ pub(crate) fn windows_map<const TERMS: usize>(
     map.expect("one row of the map for each row of windows")
 }
 
-/// The moments of each column of 11 pixels that starts at row `y`.
-fn column_moments<const TERMS: usize>(
-    width: usize,
-    y: usize,
-    window: &[f64; WINDOW],
-    terms: impl Fn(usize) -> [f64; TERMS],
-) -> Vec<[f64; TERMS]> {
-    let mut moments = vec![[0.0; TERMS]; width];
-    for (dy, weight) in window.iter().enumerate() {
-        for (x, sums) in moments.iter_mut().enumerate() {
-            let terms = terms((y + dy) * width + x);
-            (0..TERMS).for_each(|i| sums[i] += weight * terms[i]);
-        }
-    }
-    moments
-}
-
-/// The moments of a window from those of its columns.
-fn window_moments<const TERMS: usize>(columns: &[[f64; TERMS]], window: &[f64; WINDOW]) -> [f64; TERMS] {
-    let mut sums = [0.0; TERMS];
-    for (column, weight) in columns.iter().zip(window) {
-        (0..TERMS).for_each(|i| sums[i] += weight * column[i]);
-    }
-    sums
+fn add_weighted(sums: &mut Moments, weight: f64, terms: &Moments) {
+    (0..terms.len()).for_each(|i| sums[i] += weight * terms[i]);
 }
 
 /// The index of one window from its means of p, r, p², r² and pr (Wang et al. 2004, equation 13).
-fn index(&[p, r, pp, rr, pr]: &[f64; 5]) -> f64 {
+fn index(&[p, r, pp, rr, pr]: &Moments) -> f64 {
     let (variance_p, variance_r, covariance) = (pp - p * p, rr - r * r, pr - p * r);
     let numerator = (2.0 * p * r + C1) * (2.0 * covariance + C2);
     numerator / ((p * p + r * r + C1) * (variance_p + variance_r + C2))

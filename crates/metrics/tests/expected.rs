@@ -8,6 +8,7 @@
 use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
+use mateval_metrics::mask_rule::{MaskRule, ReferenceFeatures};
 use mateval_metrics::{Lpips, Net, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
 use mateval_testkit::{lpips_weights, shared_data};
 use serde::Deserialize;
@@ -220,10 +221,19 @@ fn check_lpips(net: Net, expected: impl Fn(&Case) -> (f64, Option<f64>, Option<f
         let (whole, black_fill, masked) = expected(case);
         check.value(&case.prediction, lpips.whole(prediction, reference).unwrap(), whole);
         let Some(mask) = mask else { continue };
-        let found = lpips.black_fill(prediction, reference, mask).unwrap().unwrap();
+        let found = MaskRule::BlackFill
+            .lpips(&lpips, prediction, reference, &ReferenceFeatures::default(), mask)
+            .unwrap()
+            .unwrap();
         check.value(&case.prediction, found, black_fill.unwrap());
         // The file's value also counts what spills out of the mask; unit tests hold the definition.
-        let (found, spilt) = (lpips.masked(prediction, reference, mask).unwrap().unwrap(), masked.unwrap());
+        let (found, spilt) = (
+            MaskRule::Inside
+                .lpips(&lpips, prediction, reference, &ReferenceFeatures::default(), mask)
+                .unwrap()
+                .unwrap(),
+            masked.unwrap(),
+        );
         assert!(found > 0.1 * spilt && found < spilt + LPIPS_TOLERANCE, "{}: {found} {spilt}", case.prediction);
     }
     check.finish(cases.len() + count_masked(&cases));

@@ -188,7 +188,7 @@ pub fn lpips(
     let work = move || {
         let network = network()?;
         anyhow::Ok(match &mask {
-            Some(mask) => network.masked(&a, &b, mask)?,
+            Some(mask) => network.inside(&a, &network.features(&b)?, mask)?,
             None => Some(network.whole(&a, &b)?),
         })
     };

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb, exr_io, png_io};
-use mateval_metrics::{Lpips, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
+use mateval_metrics::mask_rule::{MaskRule, ReferenceFeatures};
+use mateval_metrics::pixel::pixel_count;
+use mateval_metrics::{Lpips, MetricError, Psnr, mse, ssim};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -87,28 +89,29 @@ fn values(
     reference: &Loaded,
     mask: Option<&Mask>,
     nets: &[Lpips],
-) -> Result<PairValues, mateval_metrics::MetricError> {
+) -> Result<PairValues, MetricError> {
     let (p, r) = (&prediction.srgb, &reference.srgb);
     let (mse, psnr) = errors(prediction, reference, None)?;
-    let each = |value: &dyn Fn(&Lpips) -> Result<Option<f64>, mateval_metrics::MetricError>| {
+    let each = |value: &dyn Fn(&Lpips) -> Result<Option<f64>, MetricError>| {
         nets.iter()
             .map(|net| Ok(NetValue { metric: net.net().key().to_owned(), value: value(net)? }))
-            .collect::<Result<Vec<_>, mateval_metrics::MetricError>>()
+            .collect::<Result<Vec<_>, MetricError>>()
     };
     let masked = match mask {
         None => None,
         Some(mask) => {
             let (mse, psnr) = errors(prediction, reference, Some(mask))?;
-            let inside = ssim_valid_windows(p, r, mask)?;
+            let (ssim_inside, ssim_windows) = MaskRule::Inside.ssim(p, r, mask)?;
+            let lpips = |rule: MaskRule| each(&|net| rule.lpips(net, p, r, &ReferenceFeatures::default(), mask));
             Some(MaskedValues {
-                pixels: mateval_metrics::pixel::pixel_count(mask),
+                pixels: pixel_count(mask),
                 mse,
                 psnr,
-                ssim_inside: inside.as_ref().map(|s| s.ssim),
-                ssim_windows: inside.map_or(0, |s| s.windows),
-                ssim_black_fill: ssim_black_fill(p, r, mask)?,
-                lpips_inside: each(&|net| net.masked(p, r, mask))?,
-                lpips_black_fill: each(&|net| net.black_fill(p, r, mask))?,
+                ssim_inside,
+                ssim_windows,
+                ssim_black_fill: MaskRule::BlackFill.ssim(p, r, mask)?.0,
+                lpips_inside: lpips(MaskRule::Inside)?,
+                lpips_black_fill: lpips(MaskRule::BlackFill)?,
             })
         }
     };
@@ -120,7 +123,7 @@ fn errors(
     prediction: &Loaded,
     reference: &Loaded,
     mask: Option<&Mask>,
-) -> Result<(Option<f64>, Option<f64>), mateval_metrics::MetricError> {
+) -> Result<(Option<f64>, Option<f64>), MetricError> {
     let error = match (&prediction.bytes, &reference.bytes) {
         (Some(p), Some(r)) => mse(p, r, mask)?.map(|error| error / (255.0 * 255.0)),
         _ => mse(&prediction.srgb, &reference.srgb, mask)?,

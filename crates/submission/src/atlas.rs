@@ -34,7 +34,6 @@ impl<'a> AtlasMeshes<'a> {
         Self { source: Source::Dataset(dataset, scene), read: OnceLock::new() }
     }
 
-    /// Meshes that have been read, one for each instance.
     pub fn in_memory(meshes: &'a [TriangleMesh]) -> Self {
         Self { source: Source::Memory(meshes), read: OnceLock::new() }
     }
@@ -106,7 +105,6 @@ impl Coverage {
         Self { size, corners, rows }
     }
 
-    /// The triangle's area in texels.
     pub(crate) fn area(&self, triangle: usize) -> f64 {
         self.corners.get(triangle).map_or(0.0, |corners| twice_area(*corners).abs() / 2.0)
     }
@@ -225,12 +223,10 @@ pub(crate) struct TexelSet {
 }
 
 impl TexelSet {
-    /// No texel of a map of this size.
     pub(crate) fn none(width: usize, height: usize) -> Self {
         Self { width, height, words: vec![0; (width * height).div_ceil(64)] }
     }
 
-    /// Every texel of a map of this size.
     pub(crate) fn all(width: usize, height: usize) -> Self {
         let mut all = Self::none(width, height);
         all.add_run(0..width * height);

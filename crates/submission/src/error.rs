@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use mateval_dataset::{Finding, Severity};
 use mateval_files::FileError;
 
-/// Why a submission could not be read or checked.
 #[derive(Debug, thiserror::Error)]
 pub enum SubmissionError {
     #[error(transparent)]
@@ -23,26 +22,14 @@ pub enum SubmissionError {
     #[error("cannot use '{}': {fault}", path.display())]
     File { path: PathBuf, fault: FileFault },
     /// The public files of the dataset contradict each other.
-    #[error("cannot check against '{}': {fault}; run `mateval prep verify`", scene_file.display())]
-    UnsoundScene { scene_file: PathBuf, fault: SceneFault },
-    /// The dataset or the submission could not be read.
+    #[error("cannot check against '{}': expected {expected}, found {found}; run `mateval prep verify`", scene_file.display())]
+    UnsoundScene { scene_file: PathBuf, expected: String, found: String },
     #[error(transparent)]
     Dataset(#[from] mateval_dataset::SceneError),
-    /// The tracer cannot work with the scene.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),
-    /// A picture could not be read.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
-}
-
-/// What the public files of a scene contradict.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SceneFault {
-    #[error("expected an input view, found none")]
-    NoInputView,
-    #[error("expected pictures of {}x{} pixels for the input view, found one of {}x{}", expected[0], expected[1], found[0], found[1])]
-    PictureSize { expected: [usize; 2], found: [usize; 2] },
 }
 
 /// The fault of one file. `eval lint` reports it as a finding. Scoring replaces the map by its default, or, if only a
@@ -53,9 +40,7 @@ pub struct FileFault {
     pub code: &'static str,
     /// Where in the file, as in `texel (3, 2)`; empty for the whole file.
     pub place: String,
-    /// What was expected and what was found.
     pub message: String,
-    /// What to do.
     pub action: &'static str,
 }
 
@@ -95,7 +80,6 @@ pub(crate) fn warning(code: &str, file: &str, message: impl Into<String>, action
     finding(Severity::Warning, code, file, message, action)
 }
 
-/// Something for information.
 pub(crate) fn note(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
     finding(Severity::Note, code, file, message, action)
 }
@@ -107,12 +91,5 @@ pub(crate) fn finding(
     message: impl Into<String>,
     action: impl Into<String>,
 ) -> Finding {
-    Finding {
-        severity,
-        code: code.to_owned(),
-        file: file.to_owned(),
-        place: String::new(),
-        message: message.into(),
-        action: action.into(),
-    }
+    Finding::new(severity, code, file, "", message, action)
 }

@@ -35,9 +35,10 @@ pub fn submission_sha256(files: &[HashedFile]) -> String {
 
 /// The bytes of a file and their hash.
 pub struct SubmittedFile {
-    path: PathBuf,
-    hashed: HashedFile,
-    bytes: Vec<u8>,
+    /// Where it was read; its ending says what kind of file it should be.
+    pub path: PathBuf,
+    pub hashed: HashedFile,
+    pub bytes: Vec<u8>,
 }
 
 impl SubmittedFile {
@@ -54,29 +55,9 @@ impl SubmittedFile {
         Ok(Self::from_bytes(submission, path, bytes))
     }
 
-    /// A file that has been read already.
     pub fn from_bytes(submission: &Path, path: &Path, bytes: Vec<u8>) -> Self {
         let hashed = HashedFile { path: relative(submission, path), sha256: sha256_of_bytes(&bytes) };
         Self { path: path.to_owned(), hashed, bytes }
-    }
-
-    /// Where it was read; its ending says what kind of file it should be.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Its path in the submission and the hash of its bytes.
-    pub fn hashed(&self) -> &HashedFile {
-        &self.hashed
-    }
-
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// Gives up the bytes, so that a decoder need not copy them.
-    pub(crate) fn into_bytes(self) -> Vec<u8> {
-        self.bytes
     }
 }
 
@@ -107,7 +88,6 @@ fn place_inside(submission: &Path, path: &Path) -> Result<PathBuf, FileFault> {
 /// What `submission.json` states, and the hash of its bytes.
 #[derive(Clone, Debug)]
 pub struct SubmissionJson {
-    /// The method and how the submission was made.
     pub file: SubmissionFile,
     /// Of the bytes that [`SubmissionJson::file`] was parsed from.
     pub hashed: HashedFile,
@@ -120,7 +100,7 @@ impl SubmissionJson {
         path.symlink_metadata().map_err(FileError::io("read", &path))?;
         let source = SubmittedFile::read(submission, &path, MAX_SUBMISSION_BYTES)
             .map_err(|fault| SubmissionError::File { path: path.clone(), fault })?;
-        Ok(Self { file: SubmissionFile::parse(&path, source.bytes())?, hashed: source.hashed().clone() })
+        Ok(Self { file: SubmissionFile::parse(&path, &source.bytes)?, hashed: source.hashed })
     }
 }
 

@@ -16,7 +16,7 @@ use mateval_image::{ImageError, Texels, Texture, texture_io};
 
 use crate::atlas::{TexelSet, reached};
 use crate::error::FileFault;
-use crate::files::SubmittedFile;
+use crate::files::{HashedFile, SubmittedFile};
 
 /// Largest file of a map, in bytes.
 pub const MAX_MAP_BYTES: u64 = 512 << 20;
@@ -49,14 +49,12 @@ pub fn default_value(map: Map) -> f32 {
     }
 }
 
-/// The header of a map's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MapHeader {
     Png(PngHeader),
     Exr(ExrHeader),
 }
 
-/// A map that can be used.
 #[derive(Clone, Debug)]
 pub struct MapFile {
     pub header: MapHeader,
@@ -77,21 +75,17 @@ pub fn decode<'a>(
     map: Map,
     atlas: impl FnOnce() -> Result<&'a TriangleMesh, SceneError>,
 ) -> Result<Result<MapFile, FileFault>, SceneError> {
-    let sha256 = file.hashed().sha256.clone();
-    let (header, texture) = match decoded(file, map) {
+    let SubmittedFile { path, hashed: HashedFile { sha256, .. }, bytes } = file;
+    let decoded = check_header(&path, &bytes, map).and_then(|header| {
+        let texture = texels(&path, bytes, map, &header)?;
+        Ok((header, texture))
+    });
+    let (header, texture) = match decoded {
         Ok(decoded) => decoded,
         Err(fault) => return Ok(Err(fault)),
     };
     let repaired = repaired(texture, map, atlas)?;
     Ok(repaired.map(|(texture, bad_texels)| MapFile { header, texture, bad_texels, sha256 }))
-}
-
-/// Header and texels of a file, whose numbers may be anything.
-fn decoded(file: SubmittedFile, map: Map) -> Result<(MapHeader, Texture), FileFault> {
-    let header = check_header(file.path(), file.bytes(), map)?;
-    let path = file.path().to_owned();
-    let texture = texels(&path, file.into_bytes(), map, &header)?;
-    Ok((header, texture))
 }
 
 /// Reads the header. Fails if the file's kind, size or channels rule it out, before any texel is decoded.
@@ -142,7 +136,6 @@ fn check_kind(path: &Path, bytes: &[u8]) -> Result<(), FileFault> {
     Err(FileFault::new("wrong_kind", message, "write a PNG as .png, an EXR as .exr; nothing else is read"))
 }
 
-/// The kind of a file by its first bytes.
 fn kind_of(bytes: &[u8]) -> &'static str {
     const KINDS: [(&[u8], &str); 11] = [
         (PNG_SIGNATURE, "a PNG"),

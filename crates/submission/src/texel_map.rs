@@ -65,7 +65,6 @@ impl TexelMap {
         Self { size, rows: (0..size).into_par_iter().map(|y| observer.row(size, y)).collect() }
     }
 
-    /// Texels a side.
     pub fn size(&self) -> usize {
         self.size
     }
@@ -114,7 +113,6 @@ impl Cell {
     }
 }
 
-/// The camera, ready to project places.
 struct Eye {
     camera: Camera,
     projection: Projection,

@@ -25,7 +25,7 @@
 //! = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of paths.
 
 use mateval_image::transfer::srgb_from_linear;
-use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
+use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_tracer::noise_filter::{Surfaces, filtered_mean};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -143,7 +143,8 @@ pub fn guided_mean(pair: [&Picture<LinearRgb>; 2], guide: &ViewGuide<'_>) -> Pic
 /// k: how much brighter the half is than R times the ratio of base colours, over the whole view; 1 where R is black.
 fn scale(half: &Picture<LinearRgb>, guide: &ViewGuide<'_>) -> f64 {
     let (mut of_half, mut of_reference) = (0.0, 0.0);
-    for at in valid_pixels(guide.surfaces.valid) {
+    let valid = guide.surfaces.valid.pixels();
+    for at in (0..valid.len()).filter(|&at| valid[at]) {
         let [value, reference, ratio] = [half, guide.reference, guide.ratio].map(|picture| picture.pixels()[at].0);
         for c in 0..3 {
             of_half += f64::from(value[c]).clamp(0.0, 1.0);
@@ -152,10 +153,6 @@ fn scale(half: &Picture<LinearRgb>, guide: &ViewGuide<'_>) -> f64 {
     }
     let [least, most] = DIFFERENCE.scale_range;
     if of_reference > 0.0 { (of_half / of_reference).clamp(least, most) } else { 1.0 }
-}
-
-fn valid_pixels(valid: &Mask) -> impl Iterator<Item = usize> + '_ {
-    (0..valid.pixels().len()).filter(|&at| valid.pixels()[at])
 }
 
 /// X and u of a half. `pivot` (g R + F) and `scale` (k) come from the other half.
@@ -181,7 +178,6 @@ fn tangent(
     [0, 1].map(|which| both.map(|pixel| SrgbRgb(pixel.map(|value| value[which]))))
 }
 
-/// The mean of two pictures.
 pub(crate) fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
     Picture::from_fn(a.width(), a.height(), |x, y| {
         let (LinearRgb(a), LinearRgb(b)) = (a.get(x, y), b.get(x, y));
@@ -191,7 +187,7 @@ pub(crate) fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture
 
 #[cfg(test)]
 mod tests {
-    use mateval_image::Normal;
+    use mateval_image::{Mask, Normal};
     use mateval_metrics::mse;
     use mateval_testkit::statistics::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
 

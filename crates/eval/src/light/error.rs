@@ -32,36 +32,21 @@ pub struct LightMse {
     /// The estimate. It may be negative where the true value is near 0.
     pub mse: f64,
     /// The estimate's noise by block id, ascending, for the blocks with pixels that count.
-    pub blocks: Vec<(u64, BlockNoise)>,
+    pub blocks: Vec<(u64, BlockSums)>,
     /// One sample of an error that all pixels of all views have in common, as that of lights which were fitted to noisy
     /// pictures: its square is an estimate of its variance.
     pub common: f64,
 }
 
-/// Sums over one block, each divided by the number of all values that count. Their unit is that of the MSE.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BlockNoise {
-    /// Σ Y u.
-    pub first_half: f64,
-    /// Σ X v.
-    pub second_half: f64,
-    /// Σ u v.
-    pub both_halves: f64,
-}
+/// Σ Y u, Σ X v and Σ u v over one block, each divided by the number of all values that count. Their unit is that of the
+/// MSE.
+pub type BlockSums = [f64; 3];
 
-impl BlockNoise {
-    fn add_scaled(&mut self, factor: f64, other: &Self) {
-        self.first_half += factor * other.first_half;
-        self.second_half += factor * other.second_half;
-        self.both_halves += factor * other.both_halves;
-    }
-}
-
-fn variance<'a>(blocks: impl Iterator<Item = &'a BlockNoise>, common: f64) -> f64 {
+fn variance<'a>(blocks: impl Iterator<Item = &'a BlockSums>, common: f64) -> f64 {
     let (mut squares, mut products) = (0.0, 0.0);
-    for block in blocks {
-        squares += block.first_half.powi(2) + block.second_half.powi(2);
-        products += block.both_halves.powi(2);
+    for [first_half, second_half, both_halves] in blocks {
+        squares += first_half.powi(2) + second_half.powi(2);
+        products += both_halves.powi(2);
     }
     (squares - products).max(squares / 2.0) + common.powi(2)
 }
@@ -72,15 +57,13 @@ impl LightMse {
     pub fn new(difference: &LightDifference, mask: &Mask, blocks: &Picture<u64>) -> Result<Option<Self>, MetricError> {
         let LightDifference { halves: [first, second], noise: [u, v], .. } = difference;
         let (mut sum, mut values) = (0.0, 0_usize);
-        let mut by_block: BTreeMap<u64, BlockNoise> = BTreeMap::new();
+        let mut by_block: BTreeMap<u64, BlockSums> = BTreeMap::new();
         for (at, block) in blocks.pixels().iter().enumerate().filter(|&(at, _)| mask.pixels()[at]) {
             let noise = by_block.entry(*block).or_default();
             for c in 0..3 {
                 let [x, y, u, v] = [first, second, u, v].map(|picture| f64::from(picture.pixels()[at].0[c]));
                 sum += x * y;
-                noise.first_half += y * u;
-                noise.second_half += x * v;
-                noise.both_halves += u * v;
+                noise.iter_mut().zip([y * u, x * v, u * v]).for_each(|(sum, product)| *sum += product);
                 values += 1;
             }
         }
@@ -92,12 +75,8 @@ impl LightMse {
         if !mse.is_finite() {
             return Err(MetricError::InvalidMse { mse });
         }
-        let divided = |(block, noise): (u64, BlockNoise)| {
-            let mut divided = BlockNoise::default();
-            divided.add_scaled(share, &noise);
-            (block, divided)
-        };
-        Ok(Some(Self { mse, blocks: by_block.into_iter().map(divided).collect(), common: 0.0 }))
+        let blocks = by_block.into_iter().map(|(block, sums)| (block, sums.map(|sum| share * sum))).collect();
+        Ok(Some(Self { mse, blocks, common: 0.0 }))
     }
 
     /// The standard error of `mse`.
@@ -128,12 +107,12 @@ impl LightMse {
 /// To first order, dPSNR = -10 / ln 10 * dMSE / MSE; an exact view adds nothing. A block's effects on all views are
 /// summed before they are squared, so that correlation between views counts.
 pub fn mean_psnr_error(views: &[LightMse]) -> Option<f64> {
-    let (mut by_block, mut common): (BTreeMap<u64, BlockNoise>, f64) = Default::default();
+    let (mut by_block, mut common): (BTreeMap<u64, BlockSums>, f64) = Default::default();
     for view in views.iter().filter(|view| view.bounded() > 0.0) {
         let slope = -10.0 / LN_10 / view.bounded() / views.len() as f64;
         common += slope * view.common;
         for (block, noise) in &view.blocks {
-            by_block.entry(*block).or_default().add_scaled(slope, noise);
+            by_block.entry(*block).or_default().iter_mut().zip(noise).for_each(|(sum, noise)| *sum += slope * noise);
         }
     }
     (!views.is_empty()).then(|| variance(by_block.values(), common).sqrt())
@@ -165,9 +144,7 @@ mod tests {
     fn a_small_number_by_hand() {
         let found = error([true, true], [7, 3]).unwrap();
         assert_eq!(found.mse, 0.09375);
-        let first = BlockNoise { second_half: 0.015625, ..Default::default() };
-        let second = BlockNoise { first_half: 0.015625, second_half: 0.0625, both_halves: 0.015625 };
-        assert_eq!(found.blocks, [(3, first), (7, second)]);
+        assert_eq!(found.blocks, [(3, [0.0, 0.015625, 0.0]), (7, [0.015625, 0.0625, 0.015625])]);
         let paths = 0.015625_f64.powi(2) + 0.0625_f64.powi(2);
         assert!((found.standard_error() - paths.sqrt()).abs() < 1e-15);
         // In one block, effects are added before they are squared.
@@ -188,7 +165,7 @@ mod tests {
         let db = |views: &[LightMse]| mean_psnr_error(views).unwrap();
         assert!((db(&[one.clone(), one.clone()]) / single - 1.0).abs() < 1e-12);
         assert!((db(&[one.clone(), other]) / single - 0.5_f64.sqrt()).abs() < 1e-12);
-        let fitted = LightMse { mse: 0.1, blocks: vec![(1, BlockNoise::default())], common: 0.01 };
+        let fitted = LightMse { mse: 0.1, blocks: vec![(1, BlockSums::default())], common: 0.01 };
         assert!((db(&[fitted.clone(), fitted]) - 10.0 / LN_10 * 0.1).abs() < 1e-12);
         assert_eq!(mean_psnr_error(&[]), None);
     }
@@ -197,7 +174,7 @@ mod tests {
     fn what_is_under_the_noise_is_a_lower_bound() {
         let found = LightMse { mse: 1e-4, ..error([true, true], [1, 2]).unwrap() };
         assert!(found.is_lower_bound() && found.psnr().unwrap().db < 20.0);
-        let exact = LightMse { mse: 0.0, blocks: vec![(1, BlockNoise::default())], common: 0.0 };
+        let exact = LightMse { mse: 0.0, blocks: vec![(1, BlockSums::default())], common: 0.0 };
         assert!(!exact.is_lower_bound() && exact.psnr().unwrap().exact);
         assert_eq!(mean_psnr_error(&[exact]), Some(0.0));
     }

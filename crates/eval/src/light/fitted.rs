@@ -14,7 +14,7 @@ use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, Stage
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::light::difference::{LightDifference, encoded, guided_mean};
+use crate::light::difference::{LightDifference, encoded, guided_mean, mean_of};
 use crate::light::paths::{Paths, batches, picture_of};
 use crate::light::predictions::{Each, EncodedReference, Guides, LitPicture};
 use crate::protocol::{Protocol, Track};
@@ -37,10 +37,11 @@ pub(crate) fn score_fitted(
     let references: Vec<EncodedReference> = exposed_photos.iter().map(EncodedReference::new).collect();
     let paths = lit.paths(task, protocol);
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
-    let samples = protocol.light.samples.each_half(task.pixels());
+    let pixels = task.pixels().next().unwrap_or(0);
+    let samples = protocol.light.samples.each_half(pixels);
     // A batch holds a render and four quarters of every prediction under two fits, or two bases of the input view.
     let pictures = (5 * 2 * task.views.len()).max(4 * lit.names.len()) as u64;
-    let bytes = pictures * task.pixels() * size_of::<LinearRgb>() as u64;
+    let bytes = pictures * pixels * size_of::<LinearRgb>() as u64;
     let all: Vec<usize> = (0..task.predictions.len()).collect();
     for batch in batches(task.predictions, &all, 0, bytes) {
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
@@ -80,32 +81,20 @@ fn exposed(task: &SceneTask<'_>, radiance: &Picture<LinearRgb>) -> Picture<Linea
 
 /// The encoded difference of each half from the photo, without any correction.
 fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &Guides<'_>) -> Vec<LightDifference> {
+    let difference = |a: &Picture<LinearRgb>, b: &Picture<LinearRgb>, factor: f64| {
+        Picture::from_fn(a.width(), a.height(), |x, y| {
+            let [a, b] = [a, b].map(|picture| picture.get(x, y).0.map(|value| encoded(f64::from(value))));
+            SrgbRgb([0, 1, 2].map(|c| (factor * (a[c] - b[c])) as f32))
+        })
+    };
     let views = views.par_iter().enumerate();
     views
-        .map(|(view, quarters)| {
+        .map(|(view, [a1, a2, b1, b2])| {
             let guide = guides.of(view);
-            let value = |picture: &Picture<LinearRgb>, at: usize, c: usize| f64::from(picture.pixels()[at].0[c]);
-            let (width, height) = (guide.reference.width(), guide.reference.height());
-            let each = |of: &dyn Fn(usize, usize) -> f64| {
-                Picture::from_fn(width, height, |x, y| SrgbRgb([0, 1, 2].map(|c| of(y * width + x, c) as f32)))
-            };
-            let mean = |half: usize, at: usize, c: usize| {
-                0.5 * (value(quarters[2 * half], at, c) + value(quarters[2 * half + 1], at, c))
-            };
-            let halves =
-                [0, 1].map(|half| each(&|at, c| encoded(mean(half, at, c)) - encoded(value(guide.reference, at, c))));
-            let noise = [0, 1].map(|half| {
-                each(&|at, c| {
-                    let [a, b] = [0, 1].map(|quarter| encoded(value(quarters[2 * half + quarter], at, c)));
-                    0.5 * (a - b)
-                })
-            });
-            let linear = [0, 1].map(|half| {
-                Picture::from_fn(width, height, |x, y| {
-                    LinearRgb([0, 1, 2].map(|c| mean(half, y * width + x, c) as f32))
-                })
-            });
-            LightDifference { halves, noise, shown: guided_mean(linear.each_ref(), &guide).to_srgb() }
+            let means = [mean_of(a1, a2), mean_of(b1, b2)];
+            let halves = means.each_ref().map(|mean| difference(mean, guide.reference, 1.0));
+            let noise = [difference(a1, a2, 0.5), difference(b1, b2, 0.5)];
+            LightDifference { halves, noise, shown: guided_mean(means.each_ref(), &guide).to_srgb() }
         })
         .collect()
 }
@@ -119,7 +108,6 @@ struct LitRoom {
 
 /// The weights of the lights that one prediction was fitted with.
 struct Fit {
-    /// Those of each stream.
     streams: [LightMix; 2],
     radiances: FittedRadiances,
 }

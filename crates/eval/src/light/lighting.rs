@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::protocol::RelitRules;
 
-/// The name of a lighting of track `relit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum LightingName {
@@ -50,7 +49,6 @@ impl FromStr for LightingName {
 
 by_text!(LightingName, UnknownWord, "^(warm_cool|alone_[1-9][0-9]*)$");
 
-/// A lighting of track `relit`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelitLighting {
     pub name: LightingName,
@@ -202,13 +200,7 @@ mod tests {
         let groups = [flat(1.0), flat(4.0), Picture::filled(2, 1, LinearRgb([0.5, 2.0, 9.0]))];
         let mask = Mask::filled(2, 1, true);
         let brightness = |weights: &[[f64; 3]]| -> f64 {
-            let pairs = groups.iter().zip(weights);
-            pairs
-                .map(|(group, w)| {
-                    let s = light_of(group, &mask);
-                    luminance([0, 1, 2].map(|c| s[c] * w[c]))
-                })
-                .sum()
+            groups.iter().zip(weights).map(|(group, w)| weighted_luminance(&light_of(group, &mask), w)).sum()
         };
         let own = brightness(&[[1.0; 3]; 3]);
         let all = lightings(&rules(), &sums(&groups, &mask));

@@ -20,11 +20,9 @@ use crate::truth::{ViewTruth, true_maps};
 /// A prediction under one light, compared with the reference.
 pub(crate) struct LitPicture<'a> {
     pub(crate) track: Track,
-    /// For track `relit`.
     pub(crate) lighting: Option<LightingName>,
     /// What it is compared with, by view.
     pub(crate) references: &'a [EncodedReference],
-    /// By view.
     pub(crate) views: Vec<LightDifference>,
     /// For fitted lights, the views under the lights of each of two fits.
     pub(crate) of_fits: Option<[Vec<LightDifference>; 2]>,
@@ -77,14 +75,14 @@ pub(super) fn score_own(
     let paths = Paths { scene, world: &world, atlases, rules, pass: task.set.pass("own"), progress };
     let truth = true_maps(task.folder, task.scene)?;
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
-    let samples = rules.samples.each_half(task.pixels());
+    let samples = rules.samples.each_half(task.pixels().next().unwrap_or(0));
     // A batch holds a render and four quarters of every prediction.
-    let bytes = 5 * (lightings.len() as u64) * task.pixels_of_all_views() * size_of::<LinearRgb>() as u64;
+    let bytes = 5 * (lightings.len() as u64) * task.pixels().sum::<u64>() * size_of::<LinearRgb>() as u64;
     let mut compare = |index, ratios: &[_], lighting: &OwnLighting, quarters: ViewQuarters, not_finite| {
         let guides = Guides { truths, ratios, references: &lighting.references };
         if let Some(kept) = task.pictures {
             for (at, (view, quarters)) in task.views.iter().zip(&quarters).enumerate() {
-                kept.keep_light(index, (&scene, &view.id), lighting.name, quarters, &guides.of(at))?;
+                kept.keep_light(index, (scene, &view.id), lighting.name, quarters, &guides.of(at))?;
             }
         }
         let OwnLighting { track, name, encoded, .. } = lighting;

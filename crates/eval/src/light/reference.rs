@@ -20,14 +20,14 @@ use mateval_files::untrusted::sha256_of_file;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
-use mateval_tracer::{LightGroups, Lighting, World};
+use mateval_tracer::{LightGroups, Lighting};
 
 use crate::error::EvalError;
-use crate::light::difference::encoded;
+use crate::light::difference::{encoded, mean_of};
 use crate::light::paths::Paths;
 use crate::open_scene::{OpenScene, ViewSet};
-use crate::protocol::{LightRules, Protocol};
-use crate::truth::{check_sizes, true_maps};
+use crate::protocol::Protocol;
+use crate::truth::{sized, true_maps};
 
 /// Rises whenever the pictures could change for the same inputs.
 pub const REFERENCE_VERSION: u32 = 1;
@@ -35,12 +35,10 @@ pub const REFERENCE_VERSION: u32 = 1;
 /// The samples of a release, per pixel of each half.
 pub const RELEASE_SAMPLES: u32 = 256;
 
-/// Which references are made, and how.
 #[derive(Clone, Debug)]
 pub struct ReferenceOptions {
     /// Samples per pixel of each half.
     pub samples: u32,
-    /// The scenes; all if empty.
     pub scenes: Vec<SceneId>,
     /// Make those again that are sound.
     pub force: bool,
@@ -87,63 +85,34 @@ pub fn make_references(
 }
 
 fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'_>) -> Result<(), EvalError> {
-    let opened = OpenScene::read(dataset, scene)?;
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
     // A run that fails or is killed leaves the earlier reference as it is.
     let work = WorkFolder::start(&dataset.folder(&scene.id).scorer())?;
-    let maker = Maker { scene, opened: &opened, folder: work.path(), samples, progress };
     let mut file = ScorerFile {
         format: SCORER_FORMAT.to_owned(),
         version: REFERENCE_VERSION,
         inputs_sha256: light_inputs_sha256(&dataset.root, &scene.id)?,
         samples_each_half: samples,
         seeds: Default::default(),
-        lights: lights(&opened.world),
+        lights: world.scene().lights.iter().map(|light| light.name.clone()).collect(),
         variance: BTreeMap::new(),
         files: BTreeMap::new(),
     };
     // The only protocol that compares with R.
-    let rules = Protocol::named("mateval-3")?.light;
-    let views: Vec<&View> = scene.views.iter().collect();
+    let rules = &Protocol::named("mateval-3")?.light;
+    let truth = true_maps(&folder, scene)?;
+    let groups = LightGroups::apart(file.lights.len());
+    // The views of a set share paths.
     for set in [ViewSet::Turned, ViewSet::Wide] {
-        maker.render(set, &set.of(&views), &rules, &mut file)?;
-    }
-    json::write(&work.path().join(SCORER_JSON), &file)?;
-    Ok(work.finish()?)
-}
-
-fn lights(world: &World) -> Vec<String> {
-    world.scene().lights.iter().map(|light| light.name.clone()).collect()
-}
-
-struct Maker<'a> {
-    scene: &'a SceneFile,
-    opened: &'a OpenScene,
-    /// Becomes `ground_truth/renders/scorer`.
-    folder: &'a Path,
-    samples: u32,
-    progress: Progress<'a>,
-}
-
-impl Maker<'_> {
-    /// Renders one set of views, which share paths.
-    fn render(
-        &self,
-        set: ViewSet,
-        views: &[&View],
-        rules: &LightRules,
-        file: &mut ScorerFile,
-    ) -> Result<(), EvalError> {
+        let views = set.of(&scene.views.iter().collect::<Vec<_>>());
         if views.is_empty() {
-            return Ok(());
+            continue;
         }
-        let OpenScene { folder, world, atlases } = self.opened;
-        let (scene, progress) = (&self.scene.id, self.progress);
-        let paths = Paths { scene, world, atlases, rules, pass: set.pass("reference"), progress };
-        let truth = true_maps(folder, self.scene)?;
+        let pass = set.pass("reference");
+        let paths = Paths { scene: &scene.id, world: &world, atlases: &atlases, rules, pass, progress };
         let repaint = paths.repaint(&[&truth], None)?;
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-        let groups = LightGroups::apart(file.lights.len());
-        let half = |stream| paths.trace(&repaint, Lighting::Apart(&groups), &cameras, self.samples, stream);
+        let half = |stream| paths.trace(&repaint, Lighting::Apart(&groups), &cameras, samples, stream);
         let [a, b] = [half("a")?.remove(0), half("b")?.remove(0)];
         if set == ViewSet::Turned {
             file.seeds = ["a", "b"].map(|stream| format!("{:016x}", paths.seed(stream)));
@@ -151,17 +120,20 @@ impl Maker<'_> {
         for ((view, a), b) in views.iter().zip(a.views).zip(b.views) {
             let [a, b] = [&a.halves[0].basis, &b.halves[0].basis];
             let valid = png_io::read_mask(&folder.view(&view.id).join("valid.png"))?;
-            file.variance.insert(view.id.clone(), variance([&a.sum(), &b.sum()], &valid, self.scene.exposure));
-            let of_view = self.folder.join(view.id.as_str());
+            file.variance.insert(view.id.clone(), variance([&a.sum(), &b.sum()], &valid, scene.exposure));
+            let of_view = work.path().join(view.id.as_str());
             std::fs::create_dir_all(&of_view).map_err(FileError::io("create", &of_view))?;
             for (group, (a, b)) in a.pictures().iter().zip(b.pictures()).enumerate() {
                 let path = of_view.join(group_file(group));
-                exr_io::write_linear(&path, &mean_in_halves(a, b), Precision::Half)?;
+                // Within the range of half floats.
+                let mean = mean_of(a, b).map(|LinearRgb(rgb)| LinearRgb(rgb.map(|value| value.min(65504.0))));
+                exr_io::write_linear(&path, &mean, Precision::Half)?;
                 file.files.insert(listed_name(view, group), sha256_of_file(&path)?);
             }
         }
-        Ok(())
     }
+    json::write(&work.path().join(SCORER_JSON), &file)?;
+    Ok(work.finish()?)
 }
 
 fn group_file(group: usize) -> String {
@@ -171,14 +143,6 @@ fn group_file(group: usize) -> String {
 /// The path of a picture in `renders/scorer`.
 fn listed_name(view: &View, group: usize) -> String {
     format!("{}/{}", view.id, group_file(group))
-}
-
-/// The mean of two pictures, within the range of half floats.
-fn mean_in_halves(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    Picture::from_fn(a.width(), a.height(), |x, y| {
-        let (LinearRgb(a), LinearRgb(b)) = (a.get(x, y), b.get(x, y));
-        LinearRgb([0, 1, 2].map(|c| (0.5 * (f64::from(a[c]) + f64::from(b[c]))).min(65504.0) as f32))
-    })
 }
 
 /// The variance that noise causes in the encoded mean: mean over the valid pixels and their channels; 0 without any.
@@ -251,8 +215,7 @@ impl StoredReference {
     /// The view under each light group alone, linear, before exposure.
     pub(crate) fn groups(&self, view: &View) -> Result<Vec<Picture<LinearRgb>>, EvalError> {
         let read = |group: usize| -> Result<Picture<LinearRgb>, EvalError> {
-            let picture = exr_io::read_linear(&self.folder.join(view.id.as_str()).join(group_file(group)))?;
-            check_sizes(view, &[(picture.width(), picture.height())])?;
+            let picture = sized(view, exr_io::read_linear(&self.folder.join(listed_name(view, group)))?)?;
             // A hash that fits says nothing about values: the dataset may come from anywhere.
             match picture.pixels().iter().flat_map(|rgb| rgb.0).all(|v| v.is_finite() && v >= 0.0) {
                 true => Ok(picture),

@@ -1,8 +1,8 @@
 //! The metrics of predictions under light: of each region of every view, and of each instance.
 
 use mateval_dataset::{Camera, SceneId};
-use mateval_image::{Mask, Picture};
-use mateval_metrics::{MetricError, Psnr, flip};
+use mateval_image::Picture;
+use mateval_metrics::{MetricError, Psnr};
 use mateval_tracer::shared_centre::noise_blocks;
 use rayon::prelude::*;
 
@@ -11,10 +11,11 @@ use crate::light::difference::LightDifference;
 use crate::light::error::{LightMse, mean_psnr_error};
 use crate::light::fitted::score_fitted;
 use crate::light::predictions::{Each, LitPicture, score_own};
-use crate::materials::score::{round_to_steps, similarities};
+use crate::materials::score::measure_whole_view;
+use crate::metric::{EncodedPair, Metric, PictureKind};
 use crate::protocol::{Protocol, Track};
 use crate::result::PictureValues;
-use crate::result::key::{Metric, PictureKind, Region, Surfaces, Views};
+use crate::result::key::{Region, Surfaces};
 use crate::scene::{BaseColors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::ViewTruth;
 
@@ -50,14 +51,11 @@ pub(crate) fn compare_light(
     Ok(())
 }
 
-/// Measures pictures of light under one protocol.
 struct LightMeter<'a> {
     task: &'a SceneTask<'a>,
     protocol: &'a Protocol,
     truths: &'a [ViewTruth],
-    /// The regions of each view.
     regions: Vec<Vec<MaskedRegion>>,
-    /// The noise blocks of each view.
     blocks: Vec<Picture<u64>>,
 }
 
@@ -117,14 +115,16 @@ impl<'a> LightMeter<'a> {
             (values.exact, values.lower_bound) = (exact, mse.is_lower_bound());
         }
         if region.is_whole() && mse.is_some() {
-            let (shown, reference) = (&found.shown, &picture.references[view]);
-            let features = &reference.features;
-            let pair = [shown, &reference.picture];
-            similarities(self.protocol, self.task.lpips, pair, features, &region.mask, &mut values)?;
-            if kind == PictureKind::RgbTrue {
-                let value = flip(shown, &reference.picture, &region.mask)?;
-                values.values.extend(value.map(|value| (Metric::Flip, round_to_steps(self.protocol, value))));
-            }
+            let reference = &picture.references[view];
+            let pair = EncodedPair {
+                prediction: &found.shown,
+                reference: &reference.picture,
+                features: &reference.features,
+                mask: &region.mask,
+                mask_rule: self.protocol.mask_rule,
+                lpips: self.task.lpips,
+            };
+            measure_whole_view(self.protocol, None, &pair, &mut values)?;
         }
         Ok((values, mse))
     }
@@ -135,11 +135,7 @@ impl<'a> LightMeter<'a> {
                 let [x, y] = found.halves.each_ref().map(|half| half.pixels()[k].0.map(f64::from));
                 (0..3).map(|c| x[c] * y[c]).sum::<f64>() / 3.0
             };
-            let mut add = |region: Region, mask: &Mask| {
-                sheet.errors.add(kind, Views::of(&view.id, region), &truth.instances, mask, error);
-            };
-            add(Region::Valid, &truth.valid);
-            truth.unobserved.iter().for_each(|unobserved| add(Region::Unobserved, unobserved));
+            sheet.errors.add(kind, &view.id, truth, error);
         }
     }
 }

@@ -54,7 +54,6 @@ pub fn material_pictures(
         .collect()
 }
 
-/// Row `y` of every submission's pictures.
 fn picture_row(
     world: &World,
     atlases: &[TriangleMesh],

@@ -6,20 +6,20 @@ use mateval_dataset::dataset::View;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::alignment::{channel_scales, scaled};
 use mateval_metrics::mask_rule::ReferenceFeatures;
-use mateval_metrics::{Lpips, MetricError, Psnr, delta_e, mse};
+use mateval_metrics::{Lpips, MetricError, Psnr, mse};
 use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::materials::pictures::{MaterialPictures, material_pictures};
 use crate::materials::texels::texture_space;
+use crate::metric::{EncodedPair, HALF_A_BYTE, Measure, Metric, PictureKind, Stated};
 use crate::protocol::{AlbedoSpace, Protocol};
 use crate::result::PictureValues;
-use crate::result::key::{HALF_A_BYTE, Metric, PictureKind, Region, Surfaces, Views};
+use crate::result::key::Surfaces;
 use crate::scene::{BaseColors, InstanceErrors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::{ViewTruth, true_maps};
 
-/// One submission's pictures of a view.
 struct Predicted {
     pictures: MaterialPictures,
     /// The base colour as it is, and scaled by [`channel_scales`].
@@ -135,10 +135,6 @@ impl SceneTask<'_> {
             for (kind, _, picture, truth) in scalars.into_iter().filter(|(_, is_stated, ..)| *is_stated) {
                 let mut values = blank(kind);
                 self.locate_error(view, measure_scalar(picture, truth, mask, &mut values))?;
-                if region.surfaces == Surfaces::Specular {
-                    // One number is enough to say how far off mirrors and metals are.
-                    values.values.remove(&Metric::Mse);
-                }
                 all.push(values);
             }
         }
@@ -154,17 +150,13 @@ impl SceneTask<'_> {
         truth: &Truth<'_>,
         errors: &mut InstanceErrors,
     ) {
-        let ViewTruth { instances, valid, unobserved, .. } = truth.view;
         for (kind, albedo) in &predicted.albedos {
             let (of, reference) = (albedo, &truth.albedo.albedo);
             let error = |k: usize| match protocol.albedo_space {
                 AlbedoSpace::Linear => mean_square(of.linear.pixels()[k].0, reference.linear.pixels()[k].0),
                 AlbedoSpace::Srgb => mean_square(of.encoded.pixels()[k].0, reference.encoded.pixels()[k].0),
             };
-            errors.add(*kind, Views::of(&view.id, Region::Valid), instances, valid, error);
-            if let Some(unobserved) = unobserved {
-                errors.add(*kind, Views::of(&view.id, Region::Unobserved), instances, unobserved, error);
-            }
+            errors.add(*kind, &view.id, truth.view, error);
         }
     }
 
@@ -194,7 +186,6 @@ fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
 
 /// An albedo picture, linear and as SSIM and LPIPS see it.
 pub struct Albedo {
-    /// Linear Rec. 709.
     pub linear: Picture<LinearRgb>,
     /// Clipped to 0..1 and encoded.
     pub encoded: Picture<SrgbRgb>,
@@ -202,27 +193,24 @@ pub struct Albedo {
 
 /// A true albedo picture, with what LPIPS compares of it.
 pub struct AlbedoReference {
-    /// The picture.
     pub albedo: Albedo,
     features: ReferenceFeatures,
 }
 
 impl Albedo {
-    /// Encodes a linear picture.
     pub fn new(linear: Picture<LinearRgb>) -> Self {
         Self { encoded: linear.to_srgb(), linear }
     }
 }
 
 impl AlbedoReference {
-    /// Encodes a linear picture.
     pub fn new(linear: Picture<LinearRgb>) -> Self {
         Self { albedo: Albedo::new(linear), features: ReferenceFeatures::default() }
     }
 }
 
-/// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also SSIM, CIEDE2000 and
-/// (where its weights are loaded) LPIPS.
+/// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also the metrics of whole
+/// views.
 pub fn measure_albedo(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
@@ -238,9 +226,10 @@ pub fn measure_albedo(
     values.values.extend([(Metric::Mse, error), (Metric::Psnr, db)]);
     values.exact = exact;
     if whole {
-        similarities(protocol, lpips, [&prediction.encoded, &truth.encoded], features, mask, values)?;
-        let difference = delta_e(&prediction.linear, &truth.linear, mask)?;
-        values.values.extend(difference.map(|value| (Metric::DeltaE, value)));
+        let linear = Some([&prediction.linear, &truth.linear]);
+        let (prediction, reference, mask_rule) = (&prediction.encoded, &truth.encoded, protocol.mask_rule);
+        let pair = EncodedPair { prediction, reference, features, mask, mask_rule, lpips };
+        measure_whole_view(protocol, linear, &pair, values)?;
     }
     Ok(())
 }
@@ -258,27 +247,31 @@ pub fn albedo_mse(
     }
 }
 
-/// Adds SSIM and (where its weights are loaded) LPIPS of a prediction and a reference, in this order.
-pub(crate) fn similarities(
+/// Adds the metrics of whole views that the picture's kind has. Renders have no linear pictures.
+pub(crate) fn measure_whole_view(
     protocol: &Protocol,
-    lpips: Option<&Lpips>,
-    [prediction, reference]: [&Picture<SrgbRgb>; 2],
-    features: &ReferenceFeatures,
-    mask: &Mask,
+    linear: Option<[&Picture<LinearRgb>; 2]>,
+    pair: &EncodedPair<'_>,
     values: &mut PictureValues,
 ) -> Result<(), MetricError> {
-    let (ssim, _) = protocol.mask_rule.ssim(prediction, reference, mask)?;
-    values.values.extend(ssim.map(|ssim| (Metric::Ssim, ssim)));
-    if let Some(lpips) = lpips {
-        let distance = protocol.mask_rule.lpips(lpips, prediction, reference, features, mask)?;
-        // Its last bits depend on the processor.
-        values.values.extend(distance.map(|distance| (Metric::LpipsAlex, round_to_steps(protocol, distance))));
+    for metric in Metric::of(values.picture.kind) {
+        let value = match (&metric.row().measure, linear) {
+            (Measure::Encoded(measure), _) => measure(pair)?,
+            (Measure::Linear(measure), Some([prediction, reference])) => measure(prediction, reference, pair.mask)?,
+            _ => None,
+        };
+        let steps = 10_f64.powi(protocol.rounded_decimals as i32);
+        let stated = |value: f64| match metric.row().stated {
+            Stated::Exactly => value,
+            Stated::Rounded { .. } => (value * steps).round() / steps,
+        };
+        values.values.extend(value.map(|value| (metric, stated(value))));
     }
     Ok(())
 }
 
-/// Mean absolute and mean squared error of a picture of roughness or metallic over the mask, of the values as they are:
-/// they are not light and have no peak, so there is no PSNR, nor a similarity of pictures.
+/// The errors of a picture of roughness or metallic over the mask, of the values as they are: they are not light and
+/// have no peak, so there is no PSNR, nor a similarity of pictures.
 pub fn measure_scalar(
     prediction: &Picture<f32>,
     reference: &Picture<f32>,
@@ -290,27 +283,24 @@ pub fn measure_scalar(
         let (p, t) = (prediction.get(x, y), reference.get(x, y));
         if (p - t).abs() <= HALF_A_BYTE { t } else { p }
     });
-    let Some(error) = mse(&close, reference, Some(mask))? else { return Ok(()) };
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for at in (0..mask.pixels().len()).filter(|&at| mask.pixels()[at]) {
-        sum += (f64::from(close.pixels()[at]) - f64::from(reference.pixels()[at])).abs();
-        count += 1;
+    for metric in Metric::of(values.picture.kind) {
+        let value = match metric.row().measure {
+            Measure::Scalars(measure) => measure(&close, reference, Some(mask))?,
+            // One number is enough to say how far off mirrors and metals are.
+            Measure::SquaredError if values.picture.surfaces == Surfaces::All => mse(&close, reference, Some(mask))?,
+            _ => None,
+        };
+        values.values.extend(value.map(|value| (metric, value)));
     }
-    values.values.extend([(Metric::Mae, sum / count as f64), (Metric::Mse, error)]);
     Ok(())
-}
-
-/// A value rounded to the protocol's decimals.
-pub(crate) fn round_to_steps(protocol: &Protocol, value: f64) -> f64 {
-    let steps = 10_f64.powi(protocol.rounded_decimals as i32);
-    (value * steps).round() / steps
 }
 
 #[cfg(test)]
 mod tests {
     use mateval_dataset::{SceneId, ViewId};
 
-    use crate::result::key::{PictureKind, PictureName, Region};
+    use crate::metric::PictureKind;
+    use crate::result::key::{PictureName, Region};
 
     use super::*;
 
@@ -320,19 +310,9 @@ mod tests {
         (prediction, reference, Picture::from_fn(40, 30, |x, _| x >= 20))
     }
 
-    fn blank() -> PictureValues {
-        PictureValues {
-            scene: SceneId::new("s").unwrap(),
-            view: ViewId::new("input").unwrap(),
-            picture: PictureName::whole(PictureKind::Albedo),
-            lighting: None,
-            region: Region::Valid,
-            pixels: 600,
-            values: Default::default(),
-            mse_error: None,
-            exact: false,
-            lower_bound: false,
-        }
+    fn blank(kind: PictureKind) -> PictureValues {
+        let (scene, view) = (SceneId::new("s").unwrap(), ViewId::new("input").unwrap());
+        PictureValues::new(scene, view, PictureName::whole(kind), Region::Valid, 600)
     }
 
     fn albedo(
@@ -342,7 +322,7 @@ mod tests {
         mask: &Mask,
     ) -> PictureValues {
         let (prediction, reference) = (Albedo::new(prediction.clone()), AlbedoReference::new(reference.clone()));
-        let mut values = blank();
+        let mut values = blank(PictureKind::Albedo);
         measure_albedo(&Protocol::named(protocol).unwrap(), None, &prediction, &reference, mask, true, &mut values)
             .unwrap();
         values
@@ -371,7 +351,7 @@ mod tests {
         let reference = Picture::from_fn(40, 30, |x, y| (x as f32 + y as f32) / 100.0);
         let mask = Picture::from_fn(40, 30, |x, _| x >= 20);
         let measured = |by: f32| {
-            let mut values = blank();
+            let mut values = blank(PictureKind::Roughness);
             measure_scalar(&reference.map(|v| v + by), &reference, &mask, &mut values).unwrap();
             values.values
         };

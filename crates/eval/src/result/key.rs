@@ -1,128 +1,15 @@
-//! The keys of a result, as in `rgb_true_specular.novel.psnr`: the one place that prints and parses them, with the
-//! metrics, which direction of them is better, and how they are displayed.
+//! The keys of a result, as in `rgb_true_specular.novel.psnr`: the one place that prints and parses them.
 
 use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 
-use mateval_dataset::ViewId;
-use mateval_dataset::submission::Map;
-use mateval_metrics::Net;
-use schemars::JsonSchema;
+use mateval_dataset::word_enum::UnknownWord;
+use mateval_dataset::{ViewId, by_text, word_enum};
+use mateval_files::untrusted::quoted;
 use serde::{Deserialize, Serialize};
 
-use mateval_dataset::word_enum::UnknownWord;
-use mateval_dataset::{by_text, word_enum};
-use mateval_files::untrusted::quoted;
-
-/// The better direction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Better {
-    /// Lower is better, as with errors.
-    Lower,
-    /// Higher is better, as with similarities.
-    Higher,
-}
-
-impl Better {
-    /// The factor after which the greater of two values is the better one.
-    pub fn sign(self) -> f64 {
-        match self {
-            Self::Lower => -1.0,
-            Self::Higher => 1.0,
-        }
-    }
-}
-
-word_enum! {
-    /// A kind of score: the last word of a result's key.
-    Metric, a "metric":
-    Mse = "mse",
-    Mae = "mae",
-    /// Peak signal-to-noise ratio, in dB.
-    Psnr = "psnr",
-    Ssim = "ssim",
-    LpipsAlex = "lpips_alex",
-    /// NVIDIA's LDR-FLIP, at 67 pixels a degree.
-    Flip = "flip",
-    /// CIEDE2000, the mean over pixels.
-    DeltaE = "delta_e",
-}
-
-/// The network of [`Metric::LpipsAlex`].
-pub const LPIPS_NET: Net = Net::Alex;
-
-/// A difference of roughness or metallic of at most this counts as none: half a byte's step, which no file of bytes can
-/// avoid (0.5 is stored as 128 of 255), and a hundredth of that for rounding.
-pub const HALF_A_BYTE: f32 = 0.505 / 255.0;
-
-/// How a number is displayed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NumberStyle {
-    /// Title of a table's column, with the unit.
-    pub title: &'static str,
-    /// The factor by which values are multiplied for display.
-    pub scale: f64,
-    /// Digits after the point.
-    pub digits: usize,
-}
-
-impl NumberStyle {
-    /// The value as text.
-    pub fn text(&self, value: f64) -> String {
-        format!("{:.*}", self.digits, value * self.scale)
-    }
-}
-
-impl Metric {
-    pub const fn better(self) -> Better {
-        match self {
-            Self::Mse | Self::Mae | Self::LpipsAlex | Self::Flip | Self::DeltaE => Better::Lower,
-            Self::Psnr | Self::Ssim => Better::Higher,
-        }
-    }
-
-    /// Title, scale and digits. The paper prints MSE in units of 1e-3.
-    pub const fn style(self) -> NumberStyle {
-        match self {
-            Self::Mse => NumberStyle { title: "MSE (1e-3)", scale: 1e3, digits: 3 },
-            Self::Mae => NumberStyle { title: "MAE", scale: 1.0, digits: 4 },
-            Self::Psnr => NumberStyle { title: "PSNR", scale: 1.0, digits: 2 },
-            Self::Ssim => NumberStyle { title: "SSIM", scale: 1.0, digits: 4 },
-            Self::LpipsAlex => NumberStyle { title: "LPIPS", scale: 1.0, digits: 4 },
-            Self::Flip => NumberStyle { title: "FLIP", scale: 1.0, digits: 4 },
-            Self::DeltaE => NumberStyle { title: "CIEDE2000", scale: 1.0, digits: 3 },
-        }
-    }
-
-    /// The largest difference of a value between two processors: the last digits of LPIPS depend on them.
-    pub const fn tolerance(self) -> f64 {
-        match self {
-            Self::LpipsAlex => 1e-5,
-            _ => 0.0,
-        }
-    }
-}
-
-word_enum! {
-    /// What is compared with the truth.
-    PictureKind, a "kind of picture":
-    /// Pictures of the base colour.
-    Albedo = "albedo",
-    /// Pictures of the base colour, each channel multiplied by the scale that fits the truth best.
-    AlbedoAligned = "albedo_aligned",
-    /// Renders under the scene's own lights.
-    RgbTrue = "rgb_true",
-    /// Renders under lights that are fitted to the input view.
-    RgbFitted = "rgb_fitted",
-    /// Renders under the scene's own lights with other weights.
-    RgbRelit = "rgb_relit",
-    Roughness = "roughness",
-    Metallic = "metallic",
-    /// The texels of base colour.
-    TextureBaseColor = "texture_base_color",
-}
+use crate::metric::{Metric, PictureKind};
 
 word_enum! {
     Surfaces, a "kind of surfaces":
@@ -157,39 +44,7 @@ word_enum! {
     Unobserved = "unobserved",
 }
 
-impl PictureKind {
-    /// The title for display.
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Albedo => "Albedo",
-            Self::AlbedoAligned => "Aligned albedo",
-            Self::RgbTrue => "RGB, true light",
-            Self::RgbFitted => "RGB, fitted light",
-            Self::RgbRelit => "RGB, relit",
-            Self::Roughness => "Roughness",
-            Self::Metallic => "Metallic",
-            Self::TextureBaseColor => "Base colour texels",
-        }
-    }
-
-    /// The map that it shows; none for light, which comes from all of them.
-    pub const fn map(self) -> Option<Map> {
-        match self {
-            Self::Albedo | Self::AlbedoAligned | Self::TextureBaseColor => Some(Map::BaseColor),
-            Self::Roughness => Some(Map::Roughness),
-            Self::Metallic => Some(Map::Metallic),
-            Self::RgbTrue | Self::RgbFitted | Self::RgbRelit => None,
-        }
-    }
-
-    /// Whether it is rendered light, whose errors are estimated without render noise.
-    pub const fn is_light(self) -> bool {
-        matches!(self, Self::RgbTrue | Self::RgbFitted | Self::RgbRelit)
-    }
-}
-
 impl Surfaces {
-    /// The title for display.
     pub const fn title(self) -> &'static str {
         match self {
             Self::All => "All surfaces",
@@ -197,7 +52,6 @@ impl Surfaces {
         }
     }
 
-    /// The end of a picture's name.
     const fn suffix(self) -> &'static str {
         match self {
             Self::All => "",
@@ -207,7 +61,6 @@ impl Surfaces {
 }
 
 impl Views {
-    /// The title for display.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Input => "Input view",
@@ -243,7 +96,6 @@ pub struct PictureName {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct ResultKey {
-    /// What is compared and on which surfaces.
     pub picture: PictureName,
     pub views: Views,
     pub metric: Metric,
@@ -289,11 +141,6 @@ impl PictureName {
     pub const fn whole(kind: PictureKind) -> Self {
         Self { kind, surfaces: Surfaces::All }
     }
-
-    /// The two words whose concatenation is the printed name.
-    const fn parts(self) -> [&'static str; 2] {
-        [self.kind.word(), self.surfaces.suffix()]
-    }
 }
 
 impl ResultKey {
@@ -305,11 +152,6 @@ impl ResultKey {
     /// The same mean by another metric.
     pub const fn with(self, metric: Metric) -> Self {
         Self { metric, ..self }
-    }
-
-    fn parts(self) -> [&'static str; 6] {
-        let [kind, suffix] = self.picture.parts();
-        [kind, suffix, ".", self.views.word(), ".", self.metric.word()]
     }
 }
 
@@ -341,27 +183,22 @@ impl FromStr for ResultKey {
 
 impl fmt::Display for PictureName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.parts().iter().try_for_each(|part| f.write_str(part))
+        write!(f, "{}{}", self.kind, self.surfaces.suffix())
     }
 }
 
 impl fmt::Display for ResultKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.parts().iter().try_for_each(|part| f.write_str(part))
+        write!(f, "{}.{}.{}", self.picture, self.views, self.metric)
     }
 }
 
 by_text!(PictureName, UnknownWord, "^[a-z_]+$");
 by_text!(ResultKey, BadResultKey, "^[a-z_]+\\.[a-z_]+\\.[a-z0-9_]+$");
 
-fn by_letters(a: &[&'static str], b: &[&'static str]) -> Ordering {
-    let letters = |parts: &[&'static str]| parts.iter().flat_map(|part| part.bytes()).collect::<Vec<_>>();
-    letters(a).cmp(&letters(b))
-}
-
 impl Ord for PictureName {
     fn cmp(&self, other: &Self) -> Ordering {
-        by_letters(&self.parts(), &other.parts())
+        self.to_string().cmp(&other.to_string())
     }
 }
 
@@ -375,7 +212,7 @@ impl PartialOrd for PictureName {
 impl Ord for ResultKey {
     fn cmp(&self, other: &Self) -> Ordering {
         let place = |key: &Self| HEADLINE.iter().position(|headline| headline == key).unwrap_or(HEADLINE.len());
-        place(self).cmp(&place(other)).then_with(|| by_letters(&self.parts(), &other.parts()))
+        place(self).cmp(&place(other)).then_with(|| self.to_string().cmp(&other.to_string()))
     }
 }
 
@@ -388,11 +225,6 @@ impl PartialOrd for ResultKey {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn lpips_has_its_networks_word() {
-        assert_eq!(Metric::LpipsAlex.word(), LPIPS_NET.key());
-    }
 
     fn all() -> Vec<ResultKey> {
         let mut keys = Vec::new();

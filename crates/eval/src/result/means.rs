@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use mateval_dataset::SceneId;
 use mateval_metrics::Psnr;
 
-use crate::result::key::{Metric, PictureKind, ResultKey, Views};
+use crate::metric::{Metric, PictureKind};
+use crate::result::key::{ResultKey, Views};
 use crate::result::{InstanceTexelErrors, PictureValues};
 
 /// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over
@@ -14,29 +15,31 @@ pub fn means(
     pictures: &[PictureValues],
     texels: &[InstanceTexelErrors],
 ) -> (BTreeMap<SceneId, BTreeMap<ResultKey, f64>>, BTreeMap<ResultKey, f64>) {
-    let mut of_scene: BTreeMap<SceneId, BTreeMap<ResultKey, Mean>> = BTreeMap::new();
-    for picture in pictures {
-        for (metric, value) in &picture.values {
-            of_scene.entry(picture.scene.clone()).or_default().entry(picture.key(*metric)).or_default().add(*value);
-        }
+    let of_picture = |picture: &PictureValues| {
+        let key = |metric: &Metric| (picture.scene.clone(), picture.key(*metric));
+        picture.values.iter().map(|(metric, value)| (key(metric), *value)).collect::<Vec<_>>()
+    };
+    let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
+    for ((scene, key), mean) in means_of(pictures.iter().flat_map(of_picture)).into_iter().chain(texel_means(texels)) {
+        scenes.entry(scene).or_default().insert(key, mean);
     }
-    let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = of_scene
-        .into_iter()
-        .map(|(scene, keys)| (scene, keys.into_iter().map(|(key, mean)| (key, mean.value())).collect()))
-        .collect();
-    for (scene, values) in texel_means(texels) {
-        scenes.entry(scene).or_default().extend(values);
-    }
-    let mut of_dataset: BTreeMap<ResultKey, Mean> = BTreeMap::new();
-    for (key, value) in scenes.values().flatten() {
-        of_dataset.entry(*key).or_default().add(*value);
-    }
-    let summary = of_dataset.into_iter().map(|(key, mean)| (key, mean.value())).collect();
+    let summary = means_of(scenes.values().flatten().map(|(key, value)| (*key, *value)));
     (scenes, summary)
 }
 
+/// The mean of each key's values, which are summed in their order.
+fn means_of<K: Ord>(values: impl Iterator<Item = (K, f64)>) -> BTreeMap<K, f64> {
+    let mut sums: BTreeMap<K, (f64, usize)> = BTreeMap::new();
+    for (key, value) in values {
+        let (sum, count) = sums.entry(key).or_default();
+        *sum += value;
+        *count += 1;
+    }
+    sums.into_iter().map(|(key, (sum, count))| (key, sum / count as f64)).collect()
+}
+
 /// For each scene, of observed and of unobserved texels: the mean squared error weighted by area, and its PSNR.
-fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<ResultKey, f64>> {
+fn texel_means(texels: &[InstanceTexelErrors]) -> Vec<((SceneId, ResultKey), f64)> {
     let mut sums: BTreeMap<(SceneId, ResultKey), [f64; 2]> = BTreeMap::new();
     for instance in texels {
         for (views, errors) in [(Views::Observed, &instance.observed), (Views::Unobserved, &instance.unobserved)] {
@@ -47,16 +50,11 @@ fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<Res
             sums[1] += errors.area_m2;
         }
     }
-    let mut means: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
-    for ((scene, key), [sum, area]) in sums {
-        let values = means.entry(scene).or_default();
-        let mse = sum / area;
-        if let Ok(psnr) = Psnr::from_mse(mse) {
-            values.insert(key, mse);
-            values.insert(key.with(Metric::Psnr), psnr.db);
-        }
-    }
-    means
+    let of = |((scene, key), [sum, area]): ((SceneId, ResultKey), [f64; 2])| {
+        let psnr = Psnr::from_mse(sum / area).ok()?;
+        Some([((scene.clone(), key), sum / area), ((scene, key.with(Metric::Psnr)), psnr.db)])
+    };
+    sums.into_iter().filter_map(of).flatten().collect()
 }
 
 /// The standard error of the dataset's mean of each key, where every scene with a value has one. The noise of different
@@ -76,23 +74,6 @@ pub fn summary_noise(
     whole.map(|(key, (count, squares))| (key, squares.sqrt() / count as f64)).collect()
 }
 
-#[derive(Default)]
-struct Mean {
-    sum: f64,
-    count: usize,
-}
-
-impl Mean {
-    fn add(&mut self, value: f64) {
-        self.sum += value;
-        self.count += 1;
-    }
-
-    fn value(&self) -> f64 {
-        self.sum / self.count as f64
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use mateval_dataset::{InstanceId, ViewId};
@@ -107,18 +88,9 @@ mod tests {
     }
 
     fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValues {
-        PictureValues {
-            scene: SceneId::new(scene).unwrap(),
-            view: ViewId::new(view).unwrap(),
-            picture: PictureName::whole(PictureKind::Albedo),
-            lighting: None,
-            region,
-            pixels: 1,
-            values: value.map(|value| (Metric::Psnr, value)).into_iter().collect(),
-            mse_error: None,
-            exact: false,
-            lower_bound: false,
-        }
+        let (scene, view) = (SceneId::new(scene).unwrap(), ViewId::new(view).unwrap());
+        let picture = PictureValues::new(scene, view, PictureName::whole(PictureKind::Albedo), region, 1);
+        PictureValues { values: value.map(|value| (Metric::Psnr, value)).into_iter().collect(), ..picture }
     }
 
     /// Two instances of 1 and 3 square metres.

@@ -4,9 +4,9 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_eval::metric::{Metric, PictureKind};
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result::key::Metric;
-use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
+use mateval_eval::result::key::{ResultKey, Surfaces, Views};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 

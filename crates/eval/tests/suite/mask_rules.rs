@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use mateval_eval::materials::score::{Albedo, AlbedoReference, measure_albedo};
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::PictureValues;
-use mateval_eval::result::key::Metric;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Lpips;
 use mateval_metrics::mask_rule::MaskRule;

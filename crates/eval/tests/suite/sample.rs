@@ -17,18 +17,9 @@ pub fn lpips() -> Option<Lpips> {
 
 /// A plan that scores the submissions under `protocol`.
 pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) -> ScorePlan<'a> {
-    ScorePlan {
-        dataset: dataset(),
-        submissions: submissions.to_vec(),
-        protocols: vec![protocol.clone()],
-        scenes: scenes.iter().map(|id| SceneId::new(*id).unwrap()).collect(),
-        lpips: LpipsWeights::Missing { reason: "not asked for".to_owned(), fix: String::new() },
-        tool: "test".to_owned(),
-        jobs: 1,
-        cache: None,
-        only_cached: false,
-        pictures: None,
-    }
+    let lpips = LpipsWeights::Missing { reason: "not asked for".to_owned(), fix: String::new() };
+    let plan = ScorePlan::new(dataset(), submissions.to_vec(), vec![protocol.clone()], lpips, "test");
+    ScorePlan { scenes: scenes.iter().map(|id| SceneId::new(*id).unwrap()).collect(), ..plan }
 }
 
 /// `mateval-3` with as few samples as its rules can say.

@@ -4,9 +4,9 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::ResultKey;
 use mateval_image::{LinearRgb, Picture};
 use mateval_testkit::kept_folder;

@@ -28,18 +28,8 @@ static SCORED: LazyLock<Scored> = LazyLock::new(|| {
     let dataset = Dataset::open(&built()).unwrap();
     let submission = kept_folder("verify").join("grey");
     homogeneous::write_grey(&dataset, &submission, false).unwrap();
-    let plan = ScorePlan {
-        dataset: &dataset,
-        submissions: vec![&submission],
-        protocols: vec![Protocol::named("mateval-3").unwrap()],
-        scenes: Vec::new(),
-        lpips: missing(),
-        tool: "test".to_owned(),
-        only_cached: false,
-        pictures: None,
-        jobs: 1,
-        cache: None,
-    };
+    let protocols = vec![Protocol::named("mateval-3").unwrap()];
+    let plan = ScorePlan::new(&dataset, vec![&submission], protocols, missing(), "test");
     let result = score(&plan, &|_| ()).unwrap().remove(0);
     Scored { submission, result: serde_json::to_value(result).unwrap(), dataset }
 });

@@ -18,7 +18,7 @@ use mateval_image::{Mask, Picture, SrgbRgb};
 use rayon::prelude::*;
 
 use crate::MetricError;
-use crate::pixel::{Size, black_filled, check_finite, check_pair, check_size, pixel_count, size_of};
+use crate::pixel::{Size, check_finite, check_pair, check_size, pixel_count, size_of};
 pub use network::{EPSILON, Features, Net, SCALE, SHIFT};
 use network::{Network, Responses};
 use tensor::{PixelSet, Tensor};
@@ -60,24 +60,10 @@ impl Lpips {
         self.distance(&self.features(prediction)?, &self.features(reference)?)
     }
 
-    /// [`Lpips::whole`] of both pictures with black outside the mask (protocol `paper`). The larger the black part, the
-    /// nearer the result is to 0. `None` where no pixel counts. Values outside the mask are not read. Fails as
-    /// [`Lpips::whole`] does.
+    /// [`Lpips::whole`] of both pictures with black outside the mask (protocol `paper`), from the features of the
+    /// reference with black there. The larger the black part, the nearer the result is to 0. `None` where no pixel
+    /// counts. Fails as [`Lpips::whole`] does.
     pub fn black_fill(
-        &self,
-        prediction: &Picture<SrgbRgb>,
-        reference: &Picture<SrgbRgb>,
-        mask: &Mask,
-    ) -> Result<Option<f64>, MetricError> {
-        check_pair(prediction, reference, Some(mask))?;
-        if pixel_count(mask) == 0 {
-            return Ok(None);
-        }
-        self.black_fill_from(prediction, &self.black_filled_features(reference, mask)?, mask)
-    }
-
-    /// [`Lpips::black_fill`] from the reference's [`Lpips::black_filled_features`] under the same mask.
-    pub fn black_fill_from(
         &self,
         prediction: &Picture<SrgbRgb>,
         reference: &Features,
@@ -92,21 +78,7 @@ impl Lpips {
     /// reference's, each stage's map of distances is enlarged bilinearly to the picture's size, and the sum of the maps
     /// is averaged over the pixels of the mask. `None` where no pixel counts. The prediction is not read outside the
     /// mask, the reference is. Fails as [`Lpips::whole`] does.
-    pub fn masked(
-        &self,
-        prediction: &Picture<SrgbRgb>,
-        reference: &Picture<SrgbRgb>,
-        mask: &Mask,
-    ) -> Result<Option<f64>, MetricError> {
-        check_pair(prediction, reference, Some(mask))?;
-        if pixel_count(mask) == 0 {
-            return Ok(None);
-        }
-        self.masked_from(prediction, &self.features_named("reference", reference)?, mask)
-    }
-
-    /// [`Lpips::masked`] from the reference's [`Lpips::features`].
-    pub fn masked_from(
+    pub fn inside(
         &self,
         prediction: &Picture<SrgbRgb>,
         reference: &Features,
@@ -135,22 +107,11 @@ impl Lpips {
         Ok(Some(weighted(&self.network, &input, reference, &weights())))
     }
 
-    /// The network's features of a picture with black outside the mask. Those of a reference serve every prediction
-    /// under the same mask. Values outside the mask are not read. Fails as [`Lpips::features`] does, and if the mask
-    /// has another size.
-    pub fn black_filled_features(&self, picture: &Picture<SrgbRgb>, mask: &Mask) -> Result<Features, MetricError> {
-        self.features(&black_filled(picture, mask)?)
-    }
-
     /// The network's features of a picture. Those of a reference serve every prediction.
     ///
     /// Fails if a side is below [`Net::least_side`] or a value is not finite.
     pub fn features(&self, picture: &Picture<SrgbRgb>) -> Result<Features, MetricError> {
-        self.features_named("picture", picture)
-    }
-
-    fn features_named(&self, name: &'static str, picture: &Picture<SrgbRgb>) -> Result<Features, MetricError> {
-        network::compute(self.net, &self.network, name, picture)
+        network::compute(self.net, &self.network, picture)
     }
 
     /// [`Lpips::whole`] of two pictures from their features. Fails if networks or sizes differ.
@@ -274,6 +235,9 @@ mod tests {
     use super::*;
     use crate::lpips::network::{Stage, StageShape};
     use crate::lpips::tensor::{Convolution, Pool, Shape};
+    use crate::mask_rule::MaskRule::{BlackFill, Inside};
+    use crate::mask_rule::{MaskRule, ReferenceFeatures};
+    use crate::pixel::{black_filled, reference_filled};
 
     /// Pseudorandom values in -0.5..0.5.
     fn random(count: usize, seed: u64) -> Vec<f32> {
@@ -324,6 +288,16 @@ mod tests {
         Picture::from_fn(width, height, |x, y| SrgbRgb(std::array::from_fn(|c| values[3 * (y * width + x) + c] + 0.5)))
     }
 
+    fn masked(
+        lpips: &Lpips,
+        rule: MaskRule,
+        prediction: &Picture<SrgbRgb>,
+        reference: &Picture<SrgbRgb>,
+        mask: &Mask,
+    ) -> Result<Option<f64>, MetricError> {
+        rule.lpips(lpips, prediction, reference, &ReferenceFeatures::default(), mask)
+    }
+
     /// The metric equals its definition, computed in `f64` from the same features.
     #[test]
     fn the_distance_by_its_definition() {
@@ -347,17 +321,6 @@ mod tests {
     }
 
     #[test]
-    fn features_of_the_reference_serve_several_predictions() {
-        let (lpips, r) = (tiny(), noise(20, 20, 3));
-        let reference = lpips.features(&r).unwrap();
-        for seed in 4..7 {
-            let p = noise(20, 20, seed);
-            let found = lpips.distance(&lpips.features(&p).unwrap(), &reference).unwrap();
-            assert_eq!(found, lpips.whole(&p, &r).unwrap());
-        }
-    }
-
-    #[test]
     fn features_of_other_networks_and_sizes_are_refused() {
         let (lpips, other) = (tiny(), Lpips { net: Net::Vgg, ..tiny() });
         let (a, b) = (noise(20, 20, 8), noise(20, 21, 9));
@@ -365,7 +328,7 @@ mod tests {
         for strange in [other.features(&a).unwrap(), lpips.features(&b).unwrap()] {
             assert!(matches!(lpips.distance(&strange, &features), Err(MetricError::FeaturesDiffer { .. })));
             let full = Picture::filled(20, 20, true);
-            assert!(matches!(lpips.masked_from(&a, &strange, &full), Err(MetricError::FeaturesDiffer { .. })));
+            assert!(matches!(lpips.inside(&a, &strange, &full), Err(MetricError::FeaturesDiffer { .. })));
         }
         assert!(matches!(lpips.whole(&a, &b), Err(MetricError::SizesDiffer { .. })));
     }
@@ -378,17 +341,17 @@ mod tests {
         spoilt.set(3, 3, SrgbRgb([f32::NAN; 3]));
         spoilt.set(20, 15, SrgbRgb([1e9; 3]));
         // The prediction is not read.
-        assert_eq!(lpips.masked(&spoilt, &r, &mask).unwrap(), lpips.masked(&p, &r, &mask).unwrap());
-        assert_eq!(lpips.black_fill(&spoilt, &spoilt, &mask).unwrap(), Some(0.0));
+        assert_eq!(masked(&lpips, Inside, &spoilt, &r, &mask).unwrap(), masked(&lpips, Inside, &p, &r, &mask).unwrap());
+        assert_eq!(masked(&lpips, BlackFill, &spoilt, &spoilt, &mask).unwrap(), Some(0.0));
         let error = lpips.whole(&spoilt, &r).unwrap_err();
         assert!(matches!(error, MetricError::NotFinite { picture: "prediction", x: 3, y: 3, .. }));
         // The reference is, by the rule that fills the prediction with it.
-        let error = lpips.masked(&p, &spoilt, &mask).unwrap_err();
-        assert!(matches!(error, MetricError::NotFinite { picture: "reference", .. }));
+        let error = masked(&lpips, Inside, &p, &spoilt, &mask).unwrap_err();
+        assert!(matches!(error, MetricError::NotFinite { picture: "picture", .. }));
         // Where nothing counts, there is no value.
         let none = Picture::filled(24, 18, false);
-        assert_eq!(lpips.masked(&p, &r, &none).unwrap(), None);
-        assert_eq!(lpips.black_fill(&p, &r, &none).unwrap(), None);
+        assert_eq!(masked(&lpips, Inside, &p, &r, &none).unwrap(), None);
+        assert_eq!(masked(&lpips, BlackFill, &p, &r, &none).unwrap(), None);
     }
 
     #[test]
@@ -397,7 +360,7 @@ mod tests {
         let mask = Picture::from_fn(97, 61, |x, y| (x + y) % 5 > 1);
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let both = || (lpips.whole(&p, &r).unwrap(), lpips.masked(&p, &r, &mask).unwrap().unwrap());
+            let both = || (lpips.whole(&p, &r).unwrap(), masked(&lpips, Inside, &p, &r, &mask).unwrap().unwrap());
             let (whole, masked) = pool.install(both);
             (whole.to_bits(), masked.to_bits())
         };
@@ -414,7 +377,7 @@ mod tests {
         mask: &Mask,
         counts: &Mask,
     ) -> f64 {
-        let filled = crate::pixel::reference_filled(prediction, reference, mask).unwrap();
+        let filled = reference_filled(prediction, reference, mask).unwrap();
         let (fp, fr) = (lpips.features(&filled).unwrap(), lpips.features(reference).unwrap());
         let mut sum = 0.0;
         for (stage, (p, r)) in lpips.network.stages.iter().zip(fp.stages.iter().zip(&fr.stages)) {
@@ -458,7 +421,7 @@ mod tests {
         let everything = Picture::filled(40, 34, true);
         for (at, mask) in masks.into_iter().enumerate() {
             let mask = Picture::from_fn(40, 34, mask);
-            let found = lpips.masked(&p, &r, &mask).unwrap().unwrap();
+            let found = masked(&lpips, Inside, &p, &r, &mask).unwrap().unwrap();
             let expected = masked_by_definition(&lpips, &p, &r, &mask, &mask);
             assert!((found - expected).abs() < 1e-6 * expected, "{at}: {found} {expected}");
             let spilt = masked_by_definition(&lpips, &p, &r, &mask, &everything);
@@ -471,7 +434,7 @@ mod tests {
     fn black_fill_by_its_definition() {
         let (lpips, p, r) = (tiny(), noise(40, 34, 42), noise(40, 34, 43));
         let mask = Picture::from_fn(40, 34, |x, y| x > 21 && y < 9 || x + y < 8);
-        let found = lpips.black_fill(&p, &r, &mask).unwrap().unwrap();
+        let found = masked(&lpips, BlackFill, &p, &r, &mask).unwrap().unwrap();
         let whole = lpips.whole(&black_filled(&p, &mask).unwrap(), &black_filled(&r, &mask).unwrap()).unwrap();
         assert!((found - whole).abs() < 1e-6 * whole, "{found} {whole}");
         assert!((found - lpips.whole(&p, &r).unwrap()).abs() > 0.1 * whole);
@@ -502,9 +465,9 @@ mod tests {
             prop_assert_eq!(lpips.whole(&p, &p).unwrap(), 0.0);
             prop_assert!(whole > 0.0);
             prop_assert_eq!(lpips.whole(&r, &p).unwrap(), whole);
-            let filled = lpips.black_fill(&p, &r, &full).unwrap().unwrap();
+            let filled = masked(&lpips, BlackFill, &p, &r, &full).unwrap().unwrap();
             prop_assert!((filled - whole).abs() < 1e-9 * whole);
-            prop_assert_eq!(lpips.masked(&p, &p, &full).unwrap(), Some(0.0));
+            prop_assert_eq!(masked(&lpips, Inside, &p, &p, &full).unwrap(), Some(0.0));
         }
     }
 

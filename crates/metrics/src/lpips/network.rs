@@ -256,16 +256,10 @@ impl Responses {
     }
 }
 
-/// Runs the network. Errors call the picture `name`.
-pub(crate) fn compute(
-    net: Net,
-    network: &Network,
-    name: &'static str,
-    picture: &Picture<SrgbRgb>,
-) -> Result<Features, MetricError> {
+pub(crate) fn compute(net: Net, network: &Network, picture: &Picture<SrgbRgb>) -> Result<Features, MetricError> {
     let size = size_of(picture);
     check_size(net, network, size)?;
-    check_finite(name, picture, None)?;
+    check_finite("picture", picture, None)?;
     let all = |layer: &Layer| PixelSet::filled(layer.width, layer.height, true);
     let sets: Vec<Vec<PixelSet>> = layers(network, size).iter().map(|stage| stage.iter().map(all).collect()).collect();
     let input = scaled(picture);

@@ -1,7 +1,8 @@
 //! The explanation of one scene, as `mateval eval explain --format json` prints it.
 
 use mateval_dataset::{Finding, InstanceId, SceneId, ViewId};
-use mateval_eval::result::key::{PictureKind, Views};
+use mateval_eval::metric::PictureKind;
+use mateval_eval::result::key::Views;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

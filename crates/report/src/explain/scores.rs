@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use mateval_dataset::{InstanceId, SceneId};
 use mateval_eval::materials::score::{Albedo, albedo_mse};
+use mateval_eval::metric::PictureKind;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result::key::{PictureKind, Views};
+use mateval_eval::result::key::Views;
 use mateval_eval::shown::SceneAlbedo;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::alignment::scaled;

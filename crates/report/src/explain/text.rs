@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use mateval_dataset::ViewId;
 use mateval_dataset::progress::Table;
 
-use mateval_eval::result::key::{PictureKind, Views};
+use mateval_eval::metric::PictureKind;
+use mateval_eval::result::key::Views;
 
 use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
 use super::scores::{LIGHTS, WORST};

@@ -3,7 +3,7 @@
 use mateval_dataset::SceneId;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::DatasetId;
-use mateval_eval::result::key::PictureKind;
+use mateval_eval::metric::PictureKind;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use serde::Serialize;
 

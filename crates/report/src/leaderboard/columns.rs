@@ -2,8 +2,8 @@
 //! and surfaces, and one for each fact about methods. Also how pages name a method.
 
 use mateval_dataset::submission::{Cost, Map};
-use mateval_eval::result::key::{Better, Metric};
-use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
+use mateval_eval::metric::{Better, Metric, PictureKind};
+use mateval_eval::result::key::{ResultKey, Surfaces, Views};
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use serde::Serialize;
 

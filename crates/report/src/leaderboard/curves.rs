@@ -7,8 +7,8 @@ use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::dataset::WideView;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::{SceneId, ViewId};
+use mateval_eval::metric::Metric;
 use mateval_eval::result::PictureValues;
-use mateval_eval::result::key::Metric;
 use mateval_eval::result::key::PictureName;
 use minijinja::context;
 use minijinja::value::Serde;
@@ -280,7 +280,8 @@ fn rounded(place: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use mateval_eval::result::key::{PictureKind, Region};
+    use mateval_eval::metric::PictureKind;
+    use mateval_eval::result::key::Region;
 
     use super::*;
 

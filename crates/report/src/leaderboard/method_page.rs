@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::SceneId;
+use mateval_eval::metric::{Metric, PictureKind};
 use mateval_eval::result::InstancePixelErrors;
-use mateval_eval::result::key::Metric;
-use mateval_eval::result::key::{PictureKind, ResultKey, Views};
+use mateval_eval::result::key::{ResultKey, Views};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::{Progress, Report, SceneId, ViewId};
+use mateval_eval::metric::PictureKind;
 use mateval_eval::open_scene::scored_views;
-use mateval_eval::result::key::PictureKind;
 use mateval_files::FileError;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, SrgbRgb, png_io};

@@ -1,9 +1,9 @@
 //! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers
 //! were measured on other renders and are never ranked with results.
 
+use mateval_eval::metric::{Better, Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::key::{Better, Metric};
-use mateval_eval::result::key::{PictureKind, Views};
+use mateval_eval::result::key::Views;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::{Deserialize, Serialize};

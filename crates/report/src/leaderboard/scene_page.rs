@@ -7,7 +7,7 @@ use std::io::Read as _;
 use flate2::read::GzDecoder;
 use mateval_dataset::SceneId;
 use mateval_dataset::layout::INPUT;
-use mateval_eval::result::key::PictureKind;
+use mateval_eval::metric::PictureKind;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;

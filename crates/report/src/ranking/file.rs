@@ -6,7 +6,7 @@ use mateval_dataset::SceneId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use mateval_eval::result::key::Better;
+use mateval_eval::metric::Better;
 use mateval_eval::result::key::ResultKey;
 
 /// Differences with a corrected p-value below this are significant.

@@ -1,7 +1,7 @@
 //! The ranking by one score, which compares each pair of methods on the scenes that both have. Ranks are ranges:
 //! methods whose difference may be chance share ranks.
 
-use mateval_eval::result::key::Better;
+use mateval_eval::metric::Better;
 
 use super::bootstrap::{Clusters, DrawTable, Duel, duels, intervals};
 use super::file::{Interval, IntervalKind, KeyRanking, Pair, RankRange, RankingRules, Standing};

@@ -266,9 +266,9 @@ pub(crate) mod tests {
 
     use mateval_dataset::open::DatasetId;
     use mateval_dataset::{Finding, InstanceId, Severity, ViewId, splitmix64};
+    use mateval_eval::metric::{Metric, PictureKind};
     use mateval_eval::protocol::Protocol;
-    use mateval_eval::result::key::Metric;
-    use mateval_eval::result::key::{PictureKind, Region, Views};
+    use mateval_eval::result::key::{Region, Views};
     use mateval_eval::result::means::means;
     use mateval_eval::result::{InstanceTexelErrors, PictureValues, RESULT_FORMAT, SubmissionId, TexelErrors};
 

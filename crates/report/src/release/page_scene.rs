@@ -2,8 +2,8 @@
 
 use mateval_dataset::scene_cost::{Step, StepCost};
 use mateval_dataset::{Finding, Severity};
-use mateval_eval::result::key::Metric;
-use mateval_eval::result::key::{PictureKind, ResultKey, Surfaces, Views};
+use mateval_eval::metric::{Metric, PictureKind};
+use mateval_eval::result::key::{ResultKey, Surfaces, Views};
 use mateval_prep::compare::file::State;
 use mateval_prep::stats::SceneStats;
 use serde::Serialize;

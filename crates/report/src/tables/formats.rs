@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mateval_eval::result::key::Better;
+use mateval_eval::metric::Better;
 
 use super::table::{Cell, Column, Table};
 

@@ -1,7 +1,7 @@
 //! The tables and their columns, and the numbers that cells can hold.
 
-use mateval_eval::result::key::{Better, Metric, NumberStyle};
-use mateval_eval::result::key::{PictureKind, PictureName, ResultKey, Surfaces, Views};
+use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
+use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 
 /// How the rows of a table are grouped; every group has one row for each method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,10 +154,18 @@ const TEXTURE_SPACE: TableWords = (
 const POOLED_PICTURES: [PictureKind; 4] =
     [PictureKind::Albedo, PictureKind::AlbedoAligned, PictureKind::RgbTrue, PictureKind::RgbFitted];
 
-/// The tables of scores: the paper's, ours, and ours again over specular regions.
+/// The tables of scores: the paper's, ours, those of pictures that have no table among these, and ours again over
+/// specular regions.
 pub(super) fn all() -> Vec<Layout> {
-    let plain = PAPER.into_iter().chain(OURS).chain([TEXTURE_SPACE]);
-    let plain = plain.map(|(title, blocks)| layout(title.to_owned(), blocks, Surfaces::All));
+    let listed = || PAPER.into_iter().chain(OURS).chain([TEXTURE_SPACE]);
+    let is_listed = |kind: PictureKind| listed().any(|(_, blocks)| blocks.iter().any(|(_, known, _)| *known == kind));
+    let others = PictureKind::ALL.iter().copied().filter(|kind| !is_listed(*kind));
+    let other = |kind: PictureKind| {
+        let blocks = [("Input view", kind, Views::Input), ("Novel views", kind, Views::Novel)];
+        layout(kind.title().to_owned(), &blocks, Surfaces::All)
+    };
+    let plain = listed().map(|(title, blocks)| layout(title.to_owned(), blocks, Surfaces::All));
+    let plain = plain.chain(others.map(other));
     let specular = OURS
         .into_iter()
         .map(|(title, blocks)| layout(format!("{title}, specular regions only"), blocks, Surfaces::Specular));

@@ -6,9 +6,9 @@ use mateval_dataset::open::DatasetId;
 use mateval_dataset::{InstanceId, SceneId};
 
 use super::*;
+use mateval_eval::metric::{Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::key::Metric;
-use mateval_eval::result::key::{PictureKind, ResultKey, Views};
+use mateval_eval::result::key::{ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId};
 
 fn scene(name: &str) -> SceneId {

@@ -47,7 +47,6 @@ fn fault_of(error: std::io::Error) -> Fault {
     error.downcast::<Fault>().unwrap_or_else(|error| Fault::damaged(format!("it cannot be unpacked: {error}")))
 }
 
-/// Counts the bytes that are read of the archive.
 struct Counted {
     file: File,
     bytes: u64,

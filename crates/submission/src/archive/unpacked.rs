@@ -23,22 +23,18 @@ const LONGEST_NAME: usize = 512;
 const DEEPEST: usize = 8;
 /// Most faults that are reported.
 const MOST_FAULTS: usize = 100;
-/// Bytes read at once.
 const BLOCK: usize = 1 << 16;
 
 /// Why an archive is not unpacked.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// The archive is refused, for at least one reason.
     #[error("the archive is refused:{}", Finding::list(.0))]
     Refused(Vec<Finding>),
-    /// The file system refused.
     #[error(transparent)]
     Io(#[from] std::io::Error),
 }
 
 impl Fault {
-    /// Refuses an archive as a whole.
     pub(super) fn refused(code: &str, message: impl Into<String>, action: &str) -> Self {
         Self::Refused(vec![refusal(code, "", message, action)])
     }
@@ -97,10 +93,8 @@ impl Budget {
     }
 }
 
-/// Code and message of an entry's fault.
 type EntryFault = (&'static str, String);
 
-/// What an entry is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum EntryKind {
     File,
@@ -122,7 +116,6 @@ impl<'a> Writer<'a> {
         Self { root, budget: Budget::default(), faults: Vec::new() }
     }
 
-    /// Records a fault of an entry.
     pub(super) fn fault(&mut self, code: &str, entry: &str, message: impl Into<String>, action: &str) {
         if self.faults.len() < MOST_FAULTS {
             self.faults.push(refusal(code, entry, message, action));

@@ -39,7 +39,6 @@ pub(super) enum Kind {
     Folder,
     /// Leads nowhere, or out of the folder.
     BadLink,
-    /// A pipe, a device.
     Other,
 }
 
@@ -78,7 +77,6 @@ impl Tree {
         Ok((tree, findings))
     }
 
-    /// The kind of the entry at a path.
     pub(super) fn kind(&self, path: &str) -> Option<Kind> {
         self.entries.get(path).copied()
     }
@@ -92,7 +90,6 @@ impl Tree {
     }
 }
 
-/// A name in a folder.
 pub(super) fn joined(folder: &str, name: &str) -> String {
     if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") }
 }
@@ -109,7 +106,6 @@ fn kind_of(root: &Path, path: &Path) -> Kind {
     }
 }
 
-/// Every finding about names.
 pub(super) fn check(dataset: &Dataset, tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, kind) in tree.children("") {

@@ -13,7 +13,6 @@ use crate::map_file::{MapFile, MapHeader};
 /// Code, message, what to do.
 type Remark = (&'static str, String, &'static str);
 
-/// All findings about one file.
 pub(super) fn remarks(path: &str, map: Map, file: &MapFile) -> Vec<Finding> {
     let (warnings, known) = match &file.header {
         MapHeader::Png(header) => {
@@ -30,7 +29,6 @@ pub(super) fn remarks(path: &str, map: Map, file: &MapFile) -> Vec<Finding> {
     warned.chain(known).collect()
 }
 
-/// Remarks about the samples of a PNG.
 fn samples(map: Map, header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.bit_depth < 8 {
@@ -53,7 +51,6 @@ fn samples(map: Map, header: &PngHeader) -> Vec<Remark> {
     remarks
 }
 
-/// Remarks about chunks of a PNG that define how its numbers are to be decoded.
 fn chunks(map: Map, header: &PngHeader) -> Vec<Remark> {
     const IGNORED: [(&[u8; 4], &str, &str); 4] = [
         (b"gAMA", "gamma_chunk", "a gamma (gAMA)"),
@@ -76,7 +73,6 @@ fn chunks(map: Map, header: &PngHeader) -> Vec<Remark> {
     remarks
 }
 
-/// Remarks about anything that a PNG holds besides its picture.
 fn pictures(header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.has(b"acTL") {
@@ -89,7 +85,6 @@ fn pictures(header: &PngHeader) -> Vec<Remark> {
     remarks
 }
 
-/// Remarks about the parts of an EXR, their windows and their primaries.
 fn parts(header: &ExrHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.parts > 1 {
@@ -116,7 +111,6 @@ fn parts(header: &ExrHeader) -> Vec<Remark> {
     remarks
 }
 
-/// Remarks about the channels of an EXR.
 fn channels(map: Map, header: &ExrHeader) -> Vec<Remark> {
     let wanted: &[&str] = if map == Map::BaseColor { &["R", "G", "B"] } else { &["V", "Y"] };
     let (read, others): (Vec<&ExrChannel>, Vec<&ExrChannel>) =

@@ -23,8 +23,7 @@ pub mod submission_json;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mateval_dataset::open::Dataset;
-use mateval_dataset::open::DatasetId;
+use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::{Finding, Progress, Report, Severity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,7 +91,7 @@ pub struct FoldedFinding {
 pub fn lint(plan: &LintPlan<'_>, progress: Progress<'_>) -> Result<LintFile, SubmissionError> {
     let (tree, mut findings) = folder::Tree::walk(plan.submission)?;
     if let Some(nested) = folder::nested(&tree) {
-        return Ok(report(plan.dataset, &plan.tool, None, 0, vec![nested]));
+        return Ok(refused(plan.dataset, &plan.tool, vec![nested]));
     }
     let (method, of_json) = submission_json::check(plan.submission, &plan.dataset.file.manifest_sha256);
     findings.extend(of_json);
@@ -118,44 +117,24 @@ pub fn lint(plan: &LintPlan<'_>, progress: Progress<'_>) -> Result<LintFile, Sub
     }
     findings.extend(wrong);
     progress(Report::part("scenes checked", scenes.len(), scenes.len()));
-    Ok(report(plan.dataset, &plan.tool, method, maps, findings))
+    let dataset = DatasetId::new(plan.dataset, scenes);
+    Ok(LintFile::new(&plan.tool, method, dataset, maps, findings))
 }
 
 /// The report on an archive that was refused for these reasons.
 pub fn refused(dataset: &Dataset, tool: &str, findings: Vec<Finding>) -> LintFile {
-    report(dataset, tool, None, 0, findings)
-}
-
-fn report(dataset: &Dataset, tool: &str, method: Option<String>, maps: usize, findings: Vec<Finding>) -> LintFile {
-    let id = DatasetId::new(dataset, &dataset.scenes);
-    LintFile::new(tool.to_owned(), method, id, maps, folded(findings))
+    LintFile::new(tool, None, DatasetId::new(dataset, &dataset.scenes), 0, findings)
 }
 
 impl LintFile {
-    /// A report with its counts.
-    fn new(
-        tool: String,
-        method: Option<String>,
-        dataset: DatasetId,
-        maps: usize,
-        findings: Vec<FoldedFinding>,
-    ) -> Self {
+    fn new(tool: &str, method: Option<String>, dataset: DatasetId, maps: usize, findings: Vec<Finding>) -> Self {
+        let findings = folded(findings);
         let count = |severity: Severity| {
             findings.iter().filter(|finding| finding.severity == severity).map(|finding| finding.count).sum()
         };
-        let errors = count(Severity::Error);
-        Self {
-            format: LINT_FORMAT.to_owned(),
-            tool,
-            method,
-            dataset,
-            good: errors == 0,
-            maps,
-            errors,
-            warnings: count(Severity::Warning),
-            notes: count(Severity::Note),
-            findings,
-        }
+        let [errors, warnings, notes] = [Severity::Error, Severity::Warning, Severity::Note].map(count);
+        let (format, tool, good) = (LINT_FORMAT.to_owned(), tool.to_owned(), errors == 0);
+        Self { format, tool, method, dataset, good, maps, errors, warnings, notes, findings }
     }
 }
 
@@ -234,7 +213,7 @@ mod tests {
             wide_views: Default::default(),
             photo_renderer: None,
         };
-        let text = plain(&LintFile::new(String::new(), None, dataset, 1, folded(findings)));
+        let text = plain(&LintFile::new("", None, dataset, 1, findings));
         let expected = "error [nan] 'f0': a NaN; fix it (6 times; also 'f1', 'f2', 'f3', ...)\n\
                         warning [alpha] 'g': opacity; drop it\n\
                         not good: 6 errors, 1 warning, 0 notes; 1 map read\n";

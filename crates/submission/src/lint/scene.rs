@@ -49,11 +49,9 @@ const MOST_FILLED: f64 = 0.02;
 /// The share of maps from which a scene counts as a copy.
 const LEAST_COPIED: f64 = 0.5;
 
-/// What was found in a scene.
 #[derive(Default)]
 pub(super) struct SceneFindings {
     pub(super) findings: Vec<Finding>,
-    /// How many maps could be decoded.
     pub(super) maps: usize,
     /// Not among the findings, since both are judged over all scenes.
     pub(super) decoding: Decoding,
@@ -115,7 +113,6 @@ struct InstanceFacts {
     folder: String,
     /// Findings about its maps alone.
     findings: Vec<Finding>,
-    /// How many of its maps could be decoded.
     maps: usize,
     /// Memory that its maps take while a scene is scored.
     bytes: usize,
@@ -138,40 +135,14 @@ fn instance(
     let instance = &scene.instances[at];
     let mut facts =
         InstanceFacts { folder: format!("scenes/{}/{}", scene.id, instance.id), ..InstanceFacts::default() };
-    let reader = InstanceReader { submission, scene, at, atlases };
-    let mut read = |map| reader.read(map, &mut facts);
-    let [base_color, roughness, metallic] = [read(Map::BaseColor)?, read(Map::Roughness)?, read(Map::Metallic)?];
-    if let Some(file) = &base_color {
-        facts.looks = looks(at, &sight.pixels, &file.texture);
-        facts.fill = Some(fill(&sight.texels, &file.texture));
-        facts.base_color = Some((file.sha256.clone(), matches!(file.header, MapHeader::Png(_))));
-    }
-    let of = |file: &Option<MapFile>| -> Option<Texture> { file.as_ref().map(|file| file.texture.clone()) };
-    facts.scalars = scalar_looks(&sight.pixels, of(&roughness), of(&metallic));
-    let files = [base_color, roughness, metallic];
-    facts.copies = CopyCount::of(&dataset.folder(&scene.id), &instance.id, &files);
-    Ok(facts)
-}
-
-/// Reads the maps of one instance.
-struct InstanceReader<'a> {
-    submission: &'a Path,
-    scene: &'a SceneFile,
-    /// The instance, by its place in the scene.
-    at: usize,
-    atlases: &'a AtlasMeshes<'a>,
-}
-
-impl InstanceReader<'_> {
-    /// A map, none if it is missing or cannot be used. Fails only where the dataset does.
-    fn read(&self, map: Map, facts: &mut InstanceFacts) -> Result<Option<MapFile>, SceneError> {
-        let Self { submission, scene, at, atlases } = self;
-        let folder = MapFolder { submission, scene: &scene.id, instance: &scene.instances[*at].id };
+    let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
+    // None if the map is missing or cannot be used. Fails only where the dataset does.
+    let mut read = |map: Map| -> Result<Option<MapFile>, SceneError> {
         // A missing map, and two files for one map, are findings of `folder`.
         let Ok([path]) = <[_; 1]>::try_from(folder.present(map)) else { return Ok(None) };
         let name = relative(submission, &path);
         let decoded = match SubmittedFile::read(submission, &path, MAX_MAP_BYTES) {
-            Ok(file) => map_file::decode(file, map, || atlases.mesh(*at))?,
+            Ok(file) => map_file::decode(file, map, || atlases.mesh(at))?,
             Err(fault) => Err(fault),
         };
         match decoded {
@@ -189,7 +160,18 @@ impl InstanceReader<'_> {
                 Ok(None)
             }
         }
+    };
+    let [base_color, roughness, metallic] = [read(Map::BaseColor)?, read(Map::Roughness)?, read(Map::Metallic)?];
+    if let Some(file) = &base_color {
+        facts.looks = looks(at, &sight.pixels, &file.texture);
+        facts.fill = Some(fill(&sight.texels, &file.texture));
+        facts.base_color = Some((file.sha256.clone(), matches!(file.header, MapHeader::Png(_))));
     }
+    let of = |file: &Option<MapFile>| -> Option<Texture> { file.as_ref().map(|file| file.texture.clone()) };
+    facts.scalars = scalar_looks(&sight.pixels, of(&roughness), of(&metallic));
+    let files = [base_color, roughness, metallic];
+    facts.copies = CopyCount::of(&dataset.folder(&scene.id), &instance.id, &files);
+    Ok(facts)
 }
 
 /// Roughness and metallic exchanged: most of the scene would be mirrors.
@@ -259,7 +241,6 @@ fn hues(looks: &[Look], channel: usize) -> (f64, usize) {
     (means.deviations()[0], means.count() as usize)
 }
 
-/// The bits of a colour.
 type Bits = [u32; 3];
 
 /// The area of an instance by base colour.

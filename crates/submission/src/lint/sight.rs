@@ -17,7 +17,7 @@ use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
-use crate::error::{SceneFault, SubmissionError};
+use crate::error::SubmissionError;
 use crate::texel_map::{SurfaceTexel, TexelMap};
 
 /// Most pixels of the picture that are used.
@@ -43,9 +43,7 @@ pub(super) struct SeenPixel {
 pub(super) struct CoarseTexel {
     /// Its place; v runs upwards.
     pub(super) uv: [f32; 2],
-    /// On the surface.
     pub(super) area_m2: f64,
-    /// Whether the input picture shows it.
     pub(super) observed: bool,
 }
 
@@ -60,7 +58,6 @@ pub(super) struct InstanceSight {
 pub(super) struct Sight {
     /// In the scene's order; empty for instances without an atlas.
     pub(super) instances: Vec<InstanceSight>,
-    /// Whether the dataset has an input picture.
     pub(super) has_photo: bool,
 }
 
@@ -73,7 +70,7 @@ impl Sight {
                 || file == "views/input/rgb.exr"
         })?;
         let folder = dataset.folder(&scene.id);
-        let view = scene.view(INPUT).ok_or_else(|| unsound(&folder, SceneFault::NoInputView))?;
+        let view = scene.view(INPUT).ok_or_else(|| unsound(&folder, "an input view", "none"))?;
         let eye = Eye::read(&folder, scene, view)?;
         let mut instances = vec![InstanceSight::default(); scene.instances.len()];
         for (instance, pixel) in eye.pixels() {
@@ -86,8 +83,9 @@ impl Sight {
     }
 }
 
-fn unsound(folder: &SceneFolder, fault: SceneFault) -> SubmissionError {
-    SubmissionError::UnsoundScene { scene_file: folder.scene_file(), fault }
+fn unsound(folder: &SceneFolder, expected: impl Into<String>, found: impl Into<String>) -> SubmissionError {
+    let (expected, found) = (expected.into(), found.into());
+    SubmissionError::UnsoundScene { scene_file: folder.scene_file(), expected, found }
 }
 
 /// The input view: its camera, its pictures and the scene in front of it.
@@ -108,12 +106,11 @@ impl<'a> Eye<'a> {
         let rgb = shown.join("rgb.exr");
         let photo = if rgb.exists() { Some(exr_io::read_linear(&rgb)?) } else { None };
         let expected = [view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize];
-        let sizes = [Some([valid.width(), valid.height()]), Some([ids.width(), ids.height()])]
-            .into_iter()
-            .chain([photo.as_ref().map(|photo| [photo.width(), photo.height()])])
-            .flatten();
+        let mut sizes = vec![[valid.width(), valid.height()], [ids.width(), ids.height()]];
+        sizes.extend(photo.as_ref().map(|photo| [photo.width(), photo.height()]));
         if let Some(found) = sizes.into_iter().find(|size| *size != expected) {
-            return Err(unsound(folder, SceneFault::PictureSize { expected, found }));
+            let expected = format!("pictures of {}x{} pixels for the input view", expected[0], expected[1]);
+            return Err(unsound(folder, expected, format!("one of {}x{}", found[0], found[1])));
         }
         let world = World::new(Arc::new(reference::read_plain(folder, scene)?))?;
         Ok(Self { world, scene, camera: &view.camera, valid, ids, photo })
@@ -222,7 +219,6 @@ pub(super) fn looks(instance: usize, pixels: &[SeenPixel], base_color: &Texture)
     pixels.iter().map(look).collect()
 }
 
-/// Roughness and metallic at a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScalarLook {
     pub(super) roughness: f32,

@@ -60,7 +60,7 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
         }
         FileFault { code, message, action, .. } => fault(code, message, action),
     })?;
-    let bytes = without_mark(source.bytes());
+    let bytes = without_mark(&source.bytes);
     let bad = |found: serde_json::Error| {
         let place = format!("line {} column {}", found.line(), found.column());
         Box::new(Finding { place, ..*fault("bad_json", format!("{found}{}", hint(bytes)), "write it as JSON") })
