@@ -10,7 +10,7 @@
 //! mesh into parts. [`export_partfield`] writes the meshes. [`import_partfield`] copies PartField's labels to where
 //! `part_labels` in a recipe expects them; a dataset built from that recipe has a second part set.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
@@ -21,11 +21,14 @@ use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_linear};
+use mateval_image::limits::read_at_most;
+use mateval_image::npy_io::checked_data;
+use mateval_image::store::write_whole;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, npy_io, png_io};
 use serde_json::json;
 
-use crate::error::{BaselineError, LabelsError};
+use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::estimate_source::EstimateSource;
 use crate::geometry::{SceneGeometry, SeenPixels};
@@ -87,14 +90,13 @@ pub fn export_texgen(
     for scene in &dataset.scenes {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene, progress)?;
-        if estimate.base_color.is_none() {
-            return Err(BaselineError::NoColor(scene.id.to_string()));
-        }
+        estimate.needs_color(&scene.id)?;
         let seen = seen_pixels(&geometry, &estimate)?;
-        for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
+        for at in geometry.with_atlas() {
+            let instance = &scene.instances[at];
             progress(Report::step(&format!("{} export", scene.id), at, scene.instances.len()));
             let known = lift(&geometry, &seen, &estimate, at, TEXELS);
-            if !known.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_))) {
+            if known.texels.pixels().iter().all(|texel| texel.seen().is_none()) {
                 continue;
             }
             let id = object_id(&scene.id, instance);
@@ -115,19 +117,12 @@ pub fn export_texgen(
 
 fn write_object(folder: &Path, mesh: &TriangleMesh, known: &PartialAtlas) -> Result<(), BaselineError> {
     write_whole(&folder.join("model.obj"), obj_text(mesh).as_bytes())?;
+    let shown = |texel: Texel| texel.seen().map_or([0; 3], |[r, g, b, ..]| srgb_bytes([r, g, b]));
     png_io::write_rgb_bytes(&folder.join("model.png"), &known.texels.map(shown))?;
     png_io::write_mask(&folder.join("mask.png"), &known.texels.map(|texel| texel != Texel::Unused))?;
-    let is_seen = |texel| matches!(texel, Texel::Seen(_));
-    png_io::write_mask(&folder.join("mask_partial.png"), &known.texels.map(is_seen))?;
+    png_io::write_mask(&folder.join("mask_partial.png"), &known.texels.map(|texel| texel.seen().is_some()))?;
     write_linear(&folder.join("position.exr"), &positions(mesh, known), Precision::Float)?;
     Ok(())
-}
-
-fn shown(texel: Texel) -> [u8; 3] {
-    match texel {
-        Texel::Seen([r, g, b, ..]) => srgb_bytes([r, g, b]),
-        Texel::Unused | Texel::Unseen => [0; 3],
-    }
 }
 
 /// The place of each texel in TEXGen's space: (x, -z, y), centred, with the longest side 1; 0 outside the surface.
@@ -189,7 +184,9 @@ pub fn import_texgen(
     let textured = dataset.scenes.iter().flat_map(|scene| scene.instances.iter().map(move |i| object_id(&scene.id, i)));
     let textured = textured.filter(|id| file(results, id).is_file()).count();
     if textured == 0 {
-        return Err(BaselineError::NoTextures(results.to_owned()));
+        let why = "holds no <id>.png for any object of this dataset, such as living-00012.png; expected TEXGen's results \
+                   for the objects of `baseline texgen-export`";
+        return Err(BaselineError::unusable(results, why));
     }
     let description = format!(
         "TEXGen's textures where the input view shows nothing, {} where it does; {textured} textures; the rest as nn",
@@ -200,9 +197,7 @@ pub fn import_texgen(
     let instances = submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene, progress)?;
-        if estimate.base_color.is_none() {
-            return Err(BaselineError::NoColor(scene.id.to_string()));
-        }
+        estimate.needs_color(&scene.id)?;
         let (seen, options) = (nn::seen_pixels(&geometry, &estimate)?, NnOptions::default());
         nn::lift_scene(&geometry, &estimate, &seen, &options, progress, |at, known, medians| {
             let instance = &geometry.scene.instances[at];
@@ -248,8 +243,8 @@ pub fn export_partfield(dataset: &Dataset, out: &Path) -> Result<usize, Baseline
     let mut count = 0;
     for scene in &dataset.scenes {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
-            let path = work.path().join(object_id(&scene.id, instance)).with_extension("obj");
+        for at in geometry.with_atlas() {
+            let path = work.path().join(object_id(&scene.id, &scene.instances[at])).with_extension("obj");
             write_whole(&path, obj_text(geometry.mesh(at)).as_bytes())?;
             count += 1;
         }
@@ -277,7 +272,11 @@ pub fn import_partfield(dataset: &Dataset, clusters: &Path, parts: u8, out: &Pat
         }
     }
     if count == 0 {
-        return Err(BaselineError::NoLabels { folder: clusters.to_owned(), parts });
+        let why = format!(
+            "holds no <id>_0_{parts:02}.npy for any instance, such as living-00012_0_{parts:02}.npy, nor one with fewer \
+             parts; expected PartField's results for the meshes of `baseline partfield-export`"
+        );
+        return Err(BaselineError::unusable(clusters, why));
     }
     work.finish()?;
     Ok(count)
@@ -291,12 +290,16 @@ fn labels_of(clusters: &Path, scene: &SceneId, instance: &Instance, parts: u8) -
 
 /// The file's bytes, if it holds one label per triangle.
 fn checked_labels(path: &Path, instance: &Instance) -> Result<Vec<u8>, BaselineError> {
-    let bad = |source: LabelsError| BaselineError::BadLabels { path: path.to_owned(), source };
-    let bytes = mateval_files::untrusted::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.into()))?;
-    let labels = npy_io::whole_numbers(&bytes).map_err(|error| bad(error.into()))?.len();
-    if labels != instance.triangles {
-        let (instance, triangles) = (instance.id.to_string(), instance.triangles);
-        return Err(bad(LabelsError::Count { labels, instance, triangles }));
+    let bad = |reason: &dyn Display| {
+        let advice = "export the instances again and run PartField on them";
+        BaselineError::Unusable(format!("'{}': {reason}; {advice}", path.display()))
+    };
+    let bytes = read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(&error))?;
+    checked_data(&bytes).map_err(|error| bad(&error))?;
+    let file = npyz::NpyFile::new(bytes.as_slice()).map_err(|error| bad(&error))?;
+    let labels: u64 = file.shape().iter().product();
+    if labels != instance.triangles as u64 {
+        return Err(bad(&format!("{labels} labels; '{}' has {} triangles", instance.id, instance.triangles)));
     }
     Ok(bytes)
 }

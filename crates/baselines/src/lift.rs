@@ -28,6 +28,12 @@ pub enum Texel {
     Seen(Values),
 }
 
+impl Texel {
+    pub fn seen(self) -> Option<Values> {
+        if let Self::Seen(values) = self { Some(values) } else { None }
+    }
+}
+
 /// An instance's atlas with the texels that are known.
 pub struct PartialAtlas {
     /// The triangle that each texel belongs to.

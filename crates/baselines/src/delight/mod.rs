@@ -11,7 +11,6 @@
 
 mod files;
 mod mirrors;
-pub mod relight;
 mod room;
 mod surfaces;
 
@@ -437,18 +436,7 @@ mod tests {
         let lights = (0..lamps.len()).map(light).collect();
         let owners = (0..scene.surfaces.len()).collect();
         Planted {
-            room: PartRoom {
-                world,
-                shown: vec![None; 3],
-                lights,
-                camera,
-                emission: photo.map(|_| None),
-                photo,
-                valid,
-                parts,
-                normals,
-                owners,
-            },
+            room: PartRoom { world, shown: vec![None; 3], lights, camera, photo, valid, parts, normals, owners },
             truth,
             radiances,
         }

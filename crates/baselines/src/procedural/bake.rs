@@ -41,11 +41,9 @@ pub(super) fn bake_all(
             true => lift(geometry, seen, estimate, at, atlas.size as usize),
             false => unknown(geometry.mesh(at), atlas.size as usize),
         };
-        let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
-        known.texels = known.texels.map(|texel| match texel {
-            Texel::Seen(values) => Texel::Seen(completed(values, given)),
-            other => other,
-        });
+        let seen = keep_seen.then(|| known.texels.map(|texel| texel.seen().is_some()));
+        known.texels =
+            known.texels.map(|texel| texel.seen().map_or(texel, |values| Texel::Seen(completed(values, given))));
         baker.fill_unseen(geometry.mesh(at), materials.triangles.of(at), &mut known);
         // A graph has a roughness and a metallic of its own.
         let has_graph = materials.has_graph(at);

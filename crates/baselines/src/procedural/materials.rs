@@ -62,7 +62,10 @@ pub struct ProceduralOptions {
 impl ProceduralOptions {
     /// Fails unless `detail` is 0 to 1.
     pub fn check(&self) -> Result<(), BaselineError> {
-        if (0.0..=1.0).contains(&self.detail) { Ok(()) } else { Err(BaselineError::Detail(self.detail)) }
+        match self.detail {
+            0.0..=1.0 => Ok(()),
+            detail => Err(BaselineError::Unusable(format!("the detail is {detail}; expected 0 to 1"))),
+        }
     }
 }
 
@@ -94,10 +97,8 @@ impl<'a> SceneMaterials<'a> {
         progress: Progress<'_>,
     ) -> Result<Self, BaselineError> {
         options.check()?;
+        estimate.needs_color(&geometry.scene.id)?;
         let given = estimate.given_maps();
-        if !given.base_color {
-            return Err(BaselineError::NoColor(geometry.scene.id.to_string()));
-        }
         let set = options.part_set.as_ref();
         let triangles = PartTriangles::read(geometry, set)?;
         let samples_of_parts = PartSamples::of_parts(geometry, set, &triangles, estimate, seen)?;

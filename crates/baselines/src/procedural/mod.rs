@@ -64,7 +64,8 @@ pub fn write(
     submission::check_out(dataset, out, force)?;
     check_free(&report, force, "--out")?;
     if report.exists() && !report.join(REPORT).exists() {
-        return Err(BaselineError::NotAReport(report));
+        let why = "exists and holds no report.json, so it is not replaced; remove it, or choose another --out";
+        return Err(BaselineError::unusable(&report, why));
     }
     let fitter = fitter(options)?;
     let work = WorkFolder::start(&report)?;
@@ -166,17 +167,19 @@ fn read(folder: &Path) -> Result<Vec<Graph>, BaselineError> {
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "mtlx"));
     paths.sort();
     if paths.is_empty() || paths.len() > MOST_FILES {
-        return Err(BaselineError::GraphCount { folder: folder.to_owned(), found: paths.len(), most: MOST_FILES });
+        let why = format!("holds {} .mtlx files; expected 1 to {MOST_FILES}", paths.len());
+        return Err(BaselineError::unusable(folder, why));
     }
-    let (mut graphs, mut faults): (Vec<Graph>, _) = (Vec::new(), Vec::new());
+    let (mut graphs, mut faults): (Vec<Graph>, Vec<String>) = (Vec::new(), Vec::new());
     for path in &paths {
         match read_file(path, &Limits::default()) {
             Ok(graph) if entry(&graph.name).is_some() || graphs.iter().any(|other| other.name == graph.name) => {
-                return Err(BaselineError::SameGraph { path: path.clone(), name: graph.name });
+                let why = "which is built in or in another file of its folder; give it another name";
+                return Err(BaselineError::unusable(path, format!("has the graph '{}', {why}", graph.name)));
             }
             Ok(graph) => graphs.push(graph),
-            Err(fault) => faults.push(fault),
+            Err(fault) => faults.push(fault.to_string()),
         }
     }
-    if faults.is_empty() { Ok(graphs) } else { Err(BaselineError::BadGraphs(faults)) }
+    if faults.is_empty() { Ok(graphs) } else { Err(BaselineError::Unusable(faults.join("\n"))) }
 }
