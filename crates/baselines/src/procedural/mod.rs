@@ -26,7 +26,7 @@ use mateval_image::png_io;
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
 use mateval_procedural::library::entry;
-use mateval_procedural::mtlx::{Limits, read_file};
+use mateval_procedural::mtlx::read_file;
 
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
@@ -172,7 +172,7 @@ fn read(folder: &Path) -> Result<Vec<Graph>, BaselineError> {
     }
     let (mut graphs, mut faults): (Vec<Graph>, Vec<String>) = (Vec::new(), Vec::new());
     for path in &paths {
-        match read_file(path, &Limits::default()) {
+        match read_file(path) {
             Ok(graph) if entry(&graph.name).is_some() || graphs.iter().any(|other| other.name == graph.name) => {
                 let why = "which is built in or in another file of its folder; give it another name";
                 return Err(BaselineError::unusable(path, format!("has the graph '{}', {why}", graph.name)));
