@@ -162,17 +162,10 @@ fn picture(seen: &SeenPixels, estimate: &Estimate, instance: usize) -> Picture<[
     })
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Imported {
-    /// Number of instances in the submission.
-    pub instances: usize,
-    /// Number of those with a texture by TEXGen.
-    pub textured: usize,
-}
-
 /// Writes a submission. Seen texels hold the estimate; the base colour of all others is that of `results/<id>.png`
 /// (sRGB, any square size) at their uv. An instance without such a file, and roughness and metallic everywhere, are as
 /// `nn` with its defaults makes them from the same estimate. Fails where no file exists for any instance.
+/// Returns the number of instances in the submission, and of those with a texture by TEXGen.
 pub fn import_texgen(
     dataset: &Dataset,
     results: &Path,
@@ -180,7 +173,7 @@ pub fn import_texgen(
     force: bool,
     source: &EstimateSource,
     progress: Progress<'_>,
-) -> Result<Imported, BaselineError> {
+) -> Result<(usize, usize), BaselineError> {
     let textured = dataset.scenes.iter().flat_map(|scene| scene.instances.iter().map(move |i| object_id(&scene.id, i)));
     let textured = textured.filter(|id| file(results, id).is_file()).count();
     if textured == 0 {
@@ -203,18 +196,17 @@ pub fn import_texgen(
             let instance = &geometry.scene.instances[at];
             let path = file(results, &object_id(&scene.id, instance));
             let texture = path.is_file().then(|| read_texture(&path, Encoding::Srgb, Wrap::Clamp)).transpose()?;
-            let maps = match (known, texture) {
-                (Some(mut lifted), Some(texture)) => {
-                    composite(&mut lifted, &texture);
+            let maps = match known {
+                Some(mut lifted) => {
+                    texture.iter().for_each(|texture| composite(&mut lifted, texture));
                     Maps::of_atlas(&lifted.whole, estimate.given_maps())
                 }
-                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, estimate.given_maps()),
-                (None, _) => Maps::constant(medians.of(&geometry, at), estimate.given_maps()),
+                None => Maps::constant(medians.of(&geometry, at), estimate.given_maps()),
             };
             maps.write(&folder.join(instance.id.as_str()))
         })
     })?;
-    Ok(Imported { instances, textured })
+    Ok((instances, textured))
 }
 
 fn file(results: &Path, id: &str) -> PathBuf {

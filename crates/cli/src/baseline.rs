@@ -299,11 +299,11 @@ impl TexgenImportArgs {
         }
         let (places, source) = (&self.places, self.estimate.source(EstimateSource::Truth)?);
         let dataset = places.open()?;
-        let found = with_progress(|progress| {
+        let (instances, textured) = with_progress(|progress| {
             bridges::import_texgen(&dataset, &self.results, &places.out, places.force, &source, progress)
         })?;
-        print(&format!("{}: {} textures found\n", self.results.display(), found.textured))?;
-        places.done(found.instances)
+        print(&format!("{}: {textured} textures found\n", self.results.display()))?;
+        places.done(instances)
     }
 }
 

@@ -99,7 +99,6 @@ pub(super) fn choose_roughness(
     cache: &PhotoCache<'_>,
     surfaces: &Surfaces,
     weights: &[[f64; 3]],
-    seed: u64,
     progress: Progress<'_>,
 ) -> Result<Vec<f32>, BaselineError> {
     let (width, height) = (room.photo.width(), room.photo.height());
@@ -108,7 +107,7 @@ pub(super) fn choose_roughness(
         let roughnesses = vec![roughness; surfaces.roughnesses.len()];
         let assumed = AssumedSurfaces { roughnesses: &roughnesses, ..surfaces.assumed() };
         let step = format!("roughness {roughness}");
-        let split = split_light(&room.world, cache, &wanted, assumed, &settings(SAMPLES, seed), &|done, total| {
+        let split = split_light(&room.world, cache, &wanted, assumed, &settings(SAMPLES, 0), &|done, total| {
             progress(Report::step(&step, done, total));
         })?;
         let [diffuse, gloss] =

@@ -54,7 +54,7 @@ struct PartReport {
     instance: String,
     /// The number of pixels that show it.
     pixels: usize,
-    reason: ReasonWord,
+    reason: Reason,
     /// The side of its box that was fitted.
     side: Option<Chart>,
     /// Median base colour (linear), roughness and metallic of its pixels, or what stands for them.
@@ -63,20 +63,9 @@ struct PartReport {
     /// The error of one colour at the same held-out pixels.
     error_of_one_color: Option<f64>,
     /// The other graphs, in the order of the fit's own score.
-    others: Vec<OtherReport>,
+    others: Vec<GraphReport>,
 }
 
-/// What decided on a part's material.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum ReasonWord {
-    Unseen,
-    FewPixels,
-    OneColor,
-    Graph,
-}
-
-/// A graph with the numbers of its parameters.
 #[derive(Serialize)]
 struct GraphReport {
     graph: String,
@@ -85,16 +74,9 @@ struct GraphReport {
     error: f64,
     /// How far its statistics are from those of the pixels.
     distance: f64,
+    /// Of the chosen graph alone.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, Vec<f64>>,
-}
-
-/// A graph that was not chosen.
-#[derive(Serialize)]
-struct OtherReport {
-    graph: String,
-    class: Option<Class>,
-    error: f64,
-    distance: f64,
 }
 
 /// How many of the graphs that were not chosen are reported.
@@ -116,53 +98,38 @@ impl SceneReport {
 
 impl PartReport {
     /// The best graph that was not taken and is more than one colour.
-    fn runner_up(&self) -> Option<&OtherReport> {
+    fn runner_up(&self) -> Option<&GraphReport> {
         self.others.iter().find(|other| other.class != Some(Class::Flat))
     }
 
     fn new(part: String, instance: String, material: &PartMaterial) -> Self {
-        let reason = match &material.reason {
-            Reason::Unseen => ReasonWord::Unseen,
-            Reason::FewPixels => ReasonWord::FewPixels,
-            Reason::OneColor(_) => ReasonWord::OneColor,
-            Reason::Graph(_) => ReasonWord::Graph,
-        };
-        let fit = material.fit();
-        let all = || fit.into_iter().flat_map(|fit| std::iter::once(&fit.chosen).chain(&fit.others));
+        let all = || material.fit.iter().flat_map(|fit| std::iter::once(&fit.chosen).chain(&fit.others));
         let taken = material.graph.as_ref().map(|graph| graph.graph.name.as_str());
         let others = all().filter(|found| Some(found.graph.name.as_str()) != taken);
-        let other = |other: &Candidate| OtherReport {
-            graph: other.graph.name.clone(),
-            class: other.class,
-            error: other.error,
-            distance: other.distance,
-        };
         Self {
             part,
             instance,
             pixels: material.pixels,
-            reason,
+            reason: material.reason,
             side: material.chart,
             values: material.values,
-            chosen: material.graph.as_ref().map(GraphReport::new),
+            chosen: material.graph.as_ref().map(|graph| GraphReport { parameters: parameters(graph), ..graph.into() }),
             error_of_one_color: all().find(|found| found.class == Some(Class::Flat)).map(|found| found.error),
-            others: others.take(MOST_OTHERS).map(other).collect(),
+            others: others.take(MOST_OTHERS).map(GraphReport::from).collect(),
         }
     }
 }
 
-impl GraphReport {
-    fn new(found: &Candidate) -> Self {
-        let baked = found.settings.as_defaults(&found.graph, &found.graph.name);
-        let parameters = baked.parameters.iter().map(|p| (p.name.clone(), p.value.numbers().to_vec()));
-        Self {
-            graph: found.graph.name.clone(),
-            class: found.class,
-            error: found.error,
-            distance: found.distance,
-            parameters: parameters.collect(),
-        }
+impl From<&Candidate> for GraphReport {
+    fn from(found: &Candidate) -> Self {
+        let Candidate { class, error, distance, .. } = *found;
+        Self { graph: found.graph.name.clone(), class, error, distance, parameters: BTreeMap::new() }
     }
+}
+
+fn parameters(found: &Candidate) -> BTreeMap<String, Vec<f64>> {
+    let baked = found.settings.as_defaults(&found.graph, &found.graph.name);
+    baked.parameters.iter().map(|p| (p.name.clone(), p.value.numbers().to_vec())).collect()
 }
 
 /// A hash of the built-in graphs, on which the results depend.
@@ -238,7 +205,7 @@ pub(super) fn write_pictures(
     }
     let parts = materials.triangles.parts.iter().zip(&materials.samples);
     for ((part, samples), material) in parts.zip(&materials.of_part) {
-        if material.fit().is_none() {
+        if material.fit.is_none() {
             continue;
         }
         for (name, picture) in &all {
@@ -325,9 +292,9 @@ fn section(scene: &ShownScene) -> String {
     text.push_str("</div>\n");
     let mut parts: Vec<&PartReport> = scene.report.parts.iter().collect();
     parts.sort_by(|a, b| b.pixels.cmp(&a.pixels).then(a.part.cmp(&b.part)));
-    let count = |reason: ReasonWord| parts.iter().filter(|part| part.reason == reason).count();
-    let (graphs, colors) = (count(ReasonWord::Graph), count(ReasonWord::OneColor));
-    let (few, unseen) = (count(ReasonWord::FewPixels), count(ReasonWord::Unseen));
+    let count = |reason: Reason| parts.iter().filter(|part| part.reason == reason).count();
+    let (graphs, colors) = (count(Reason::Graph), count(Reason::OneColor));
+    let (few, unseen) = (count(Reason::FewPixels), count(Reason::Unseen));
     writeln!(
         text,
         "<p>Parts with a graph: {graphs}; of one colour: {colors}; with too few pixels: {few}; not seen: {unseen}. The \
@@ -388,7 +355,7 @@ fn table(parts: &[&PartReport]) -> String {
     for part in parts.iter().filter(|part| part.pixels > 0) {
         let material = match (&part.chosen, part.reason) {
             (Some(chosen), _) => escaped(&chosen.graph),
-            (None, ReasonWord::FewPixels) => "one colour: few pixels".to_owned(),
+            (None, Reason::FewPixels) => "one colour: few pixels".to_owned(),
             (None, _) => "one colour".to_owned(),
         };
         let runner_up = part.runner_up().map_or("-".to_owned(), |other| escaped(&other.graph));
