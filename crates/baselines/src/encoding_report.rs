@@ -185,9 +185,10 @@ pub fn report(
                     unstated.insert(map.stem());
                 }
                 Ok(_) => {
-                    let Some(picture) = ScenePicture::read(dataset, scene, folder, (map, file, channel))? else {
-                        continue;
-                    };
+                    let Some(stored) = file.stored(folder, scene.id.as_str(), None)? else { continue };
+                    let view = InputView::read(dataset, scene, map)?;
+                    let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
+                    let picture = ScenePicture { map, channel, stored: stored.numbers, view, most };
                     for (samples, reading) in samples.iter_mut().zip(&readings) {
                         samples.add(scene, &picture, adapter.placement, *reading)?;
                     }
@@ -267,21 +268,6 @@ struct ScenePicture {
     stored: Picture<[f32; 3]>,
     view: InputView,
     most: usize,
-}
-
-impl ScenePicture {
-    /// The file's picture and the view that it shows; absent if an optional file is missing.
-    fn read(
-        dataset: &Dataset,
-        scene: &SceneFile,
-        folder: &Path,
-        (map, file, channel): (Map, &AdaptedFile, Option<Channel>),
-    ) -> Result<Option<Self>, BaselineError> {
-        let Some(stored) = file.stored(folder, scene.id.as_str(), None)? else { return Ok(None) };
-        let view = InputView::read(dataset, scene, map)?;
-        let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
-        Ok(Some(Self { map, channel, stored: stored.numbers, view, most }))
-    }
 }
 
 /// The samples of one map in one reading.

@@ -38,9 +38,7 @@ pub use bake::Baked;
 use bake::bake_all;
 use materials::SceneMaterials;
 pub use materials::{FitMode, ProceduralOptions};
-use report::{
-    REPORT, REPORT_FORMAT, ReportFile, SceneReport, ShownScene, html, library_sha256, write_graphs, write_pictures,
-};
+use report::{REPORT, REPORT_FORMAT, ReportFile, SceneReport, html, library_sha256, write_graphs, write_pictures};
 
 /// The folder of a submission's report: beside it, with `.report` at the end of its name.
 pub fn report_folder(submission: &Path) -> PathBuf {
@@ -89,7 +87,7 @@ pub fn write(
         let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
         let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;
         let has_photo = write_pictures(&place, photo.as_ref(), &estimate, &materials)?;
-        scenes.push(ShownScene { report: SceneReport::new(scene, &materials), has_photo });
+        scenes.push((SceneReport::new(scene, &materials), has_photo));
         Ok(count)
     })?;
     let index = work.path().join("index.html");
@@ -99,7 +97,7 @@ pub fn write(
         method: method.name,
         description: method.description,
         library_sha256: library_sha256(),
-        scenes: scenes.into_iter().map(|scene| scene.report).collect(),
+        scenes: scenes.into_iter().map(|(report, _)| report).collect(),
     };
     json::write(&work.path().join(REPORT), &file)?;
     work.finish()?;

@@ -24,10 +24,8 @@ use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Placement};
 use crate::submission::Method;
 
-/// The name of the file.
 pub(super) const REPORT: &str = "report.json";
 
-/// The format's name and version.
 pub(super) const REPORT_FORMAT: &str = "mateval-procedural/1";
 
 #[derive(Serialize)]
@@ -266,14 +264,8 @@ fn swatch(part: &PartSamples, material: &PartMaterial, given: GivenMaps) -> Opti
     )
 }
 
-/// A scene on the page.
-pub(super) struct ShownScene {
-    pub(super) report: SceneReport,
-    pub(super) has_photo: bool,
-}
-
-/// The page. Ids and names of graphs contain no characters that are special in HTML, save those of a user's files.
-pub(super) fn html(method: &Method, scenes: &[ShownScene]) -> String {
+/// The page of the scenes, each with whether it has a photo. Ids and names of graphs contain no characters that are special in HTML, save those of a user's files.
+pub(super) fn html(method: &Method, scenes: &[(SceneReport, bool)]) -> String {
     let introduction = format!(
         "<strong>{}</strong>: {}. Parts are sorted by the number of pixels that show them. Errors are mean squares of \
          differences of linear colours at pixels that took no part in the fit.",
@@ -283,14 +275,14 @@ pub(super) fn html(method: &Method, scenes: &[ShownScene]) -> String {
     plain("Procedural materials", &introduction, &scenes.iter().map(section).collect::<String>(), "")
 }
 
-fn section(scene: &ShownScene) -> String {
-    let id = &scene.report.id;
-    let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
-    for (name, caption) in pictures(scene.has_photo) {
+fn section((scene, has_photo): &(SceneReport, bool)) -> String {
+    let id = &scene.id;
+    let mut text = format!("<section><h2>{id}</h2><div class=\"pictures\">\n");
+    for (name, caption) in pictures(*has_photo) {
         text.push_str(&figure(&format!("{id}/{name}.png"), id, caption));
     }
     text.push_str("</div>\n");
-    let mut parts: Vec<&PartReport> = scene.report.parts.iter().collect();
+    let mut parts: Vec<&PartReport> = scene.parts.iter().collect();
     parts.sort_by(|a, b| b.pixels.cmp(&a.pixels).then(a.part.cmp(&b.part)));
     let count = |reason: Reason| parts.iter().filter(|part| part.reason == reason).count();
     let (graphs, colors) = (count(Reason::Graph), count(Reason::OneColor));
@@ -301,7 +293,7 @@ fn section(scene: &ShownScene) -> String {
          graphs with their parameters: <a href=\"{id}/materials.mtlx\">materials.mtlx</a></p>"
     )
     .expect("writing to a String cannot fail");
-    text.extend(parts.iter().filter(|part| part.chosen.is_some()).map(|part| with_graph(scene, part)));
+    text.extend(parts.iter().filter_map(|part| Some(with_graph(id, *has_photo, part, part.chosen.as_ref()?))));
     text.push_str(&table(&parts));
     text.push_str("</section>\n");
     text
@@ -313,11 +305,10 @@ fn pictures(has_photo: bool) -> Vec<(&'static str, &'static str)> {
 }
 
 /// A part with its pictures and parameters.
-fn with_graph(scene: &ShownScene, part: &PartReport) -> String {
-    let (id, name) = (&scene.report.id, &part.part);
-    let Some(chosen) = &part.chosen else { return String::new() };
-    let mut text = format!("<h3>{name}: {}</h3><div class=\"row\">\n", escaped(&chosen.graph));
-    for (picture, caption) in pictures(scene.has_photo).into_iter().chain([("swatch", "The graph from the front")]) {
+fn with_graph(id: &str, has_photo: bool, part: &PartReport, chosen: &GraphReport) -> String {
+    let name = &part.part;
+    let mut text = format!("<h3>{name}: {}</h3><div class=\"pictures\">\n", escaped(&chosen.graph));
+    for (picture, caption) in pictures(has_photo).into_iter().chain([("swatch", "The graph from the front")]) {
         text.push_str(&figure(&format!("{id}/{name}-{picture}.png"), name, caption));
     }
     text.push_str("</div><p>");
