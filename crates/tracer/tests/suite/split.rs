@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use mateval_dataset::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
-use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SurfaceIndex};
+use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, SurfaceIndex};
 use mateval_dataset::{Camera, Intrinsics};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::aov::hit_through;
 use mateval_tracer::error::{RequestFault, TracerError};
-use mateval_tracer::{AssumedSurfaces, LightBasis, PhotoCache, RenderSettings, SplitLight, World, render, split_light};
+use mateval_tracer::{AssumedSurfaces, PhotoCache, RenderSettings, SplitLight, World, render, split_light};
 
 const COLOR: f32 = 0.6;
 const ROUGHNESS: f32 = 0.4;
