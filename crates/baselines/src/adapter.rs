@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::SceneError;
 use mateval_dataset::submission::{Map, StoredEncoding};
+use mateval_files::FileError;
 use mateval_image::texture_io::read_texture;
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
 use serde::Deserialize;
@@ -62,7 +62,7 @@ impl Adapter {
             let why = format!("is neither a built-in adapter nor a file; expected one of {known}, or a TOML file");
             return Err(BaselineError::unusable(path, why));
         }
-        Self::parse(&std::fs::read_to_string(path).map_err(SceneError::io("read", path))?, path)
+        Self::parse(&std::fs::read_to_string(path).map_err(FileError::io("read", path))?, path)
     }
 
     /// The names of the built-in adapters.

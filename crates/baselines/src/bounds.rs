@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use mateval_dataset::SceneError;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::{GREY as GREY_VALUE, MAP_SIZES, Map};
+use mateval_files::FileError;
 use mateval_image::Picture;
 use mateval_image::png_io::write_rgb_bytes;
 
@@ -34,7 +34,7 @@ pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, 
         for map in Map::ALL {
             let name = Path::new(map.stem()).with_extension("png");
             let (from, to) = (truth.join(&name), folder.join(&name));
-            std::fs::copy(&from, &to).map_err(SceneError::io("copy", &from))?;
+            std::fs::copy(&from, &to).map_err(FileError::io("copy", &from))?;
         }
         Ok(())
     })

@@ -14,7 +14,8 @@ pub enum BaselineError {
     Procedural(#[from] mateval_procedural::ProceduralError),
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),
-    /// The dataset could not be read, or a file could not be read or written.
+    #[error(transparent)]
+    Files(#[from] mateval_files::FileError),
     #[error(transparent)]
     Dataset(#[from] mateval_dataset::SceneError),
     #[error(transparent)]

@@ -7,8 +7,9 @@ use mateval_dataset::dataset::{Instance, SceneFile};
 use mateval_dataset::layout::is_rendered;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, StoredEncoding, SubmissionFile, scene_folder};
-use mateval_dataset::work_folder::{WorkFolder, check_free, is_inside};
-use mateval_dataset::{Progress, Report, SceneError, json};
+use mateval_dataset::{Progress, Report, json};
+use mateval_files::FileError;
+use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
 
 use crate::error::BaselineError;
 

@@ -55,7 +55,7 @@ pub fn write(
     // Ids and names of lights contain no characters that are special in HTML.
     let introduction = "A photo is base colour times the light on a white surface, plus light that does not depend on \
                         base colour.";
-    std::fs::write(&index, page("De-lit photos", introduction, &sections)).map_err(SceneError::io("write", &index))?;
+    std::fs::write(&index, page("De-lit photos", introduction, &sections)).map_err(FileError::io("write", &index))?;
     work.finish()?;
     Ok(dataset.scenes.len())
 }

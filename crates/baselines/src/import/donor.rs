@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::material::MaterialParameter;
-use mateval_dataset::source_folder::FileFault;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::shortened;
 use mateval_image::{ImageError, Texture};
 
 use crate::estimate::{GivenMaps, Values};

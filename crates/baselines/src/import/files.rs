@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use mateval_dataset::dataset::{Instance, SceneFile};
-use mateval_dataset::findings::shortened;
-use mateval_dataset::source_folder::SourceFolder;
-use mateval_dataset::{InstanceId, PartSetId, SceneError, SceneId, json};
+use mateval_dataset::{InstanceId, PartSetId, SceneId, json};
+use mateval_files::FileError;
+use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -113,7 +114,7 @@ impl ImportFolder {
     }
 
     fn folder(&self) -> Result<SourceFolder, BaselineError> {
-        Ok(SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(SceneError::io("open", &self.path))?)
+        Ok(SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(FileError::io("open", &self.path))?)
     }
 }
 

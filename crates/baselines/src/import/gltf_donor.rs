@@ -8,11 +8,10 @@ use glam::{DMat4, DVec3, Mat2, Vec2, Vec3};
 use gltf::Semantic;
 use gltf::material::PbrSpecularGlossiness;
 use gltf::mesh::Mode;
-use mateval_dataset::findings::shortened;
 use mateval_dataset::gltf_file::{GltfFile, INSTANCING, first_numbers, indices, numbers, parse, triangles, view_bytes};
-use mateval_dataset::source_folder::SourceFolder;
 use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 

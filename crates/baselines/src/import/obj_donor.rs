@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_dataset::findings::shortened;
 use mateval_dataset::obj::{self, Materials, ObjLimits, ObjMaterial};
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texture, Wrap};
