@@ -22,7 +22,6 @@ use mateval_files::untrusted::read_at_most;
 use mateval_files::whole::write_whole;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_linear};
-use mateval_image::npy_io::checked_data;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, npy_io, png_io};
 use serde_json::json;
@@ -286,10 +285,8 @@ fn checked_labels(path: &Path, instance: &Instance) -> Result<Vec<u8>, BaselineE
         BaselineError::Unusable(format!("'{}': {reason}; {advice}", path.display()))
     };
     let bytes = read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(&error))?;
-    checked_data(&bytes).map_err(|error| bad(&error))?;
-    let file = npyz::NpyFile::new(bytes.as_slice()).map_err(|error| bad(&error))?;
-    let labels: u64 = file.shape().iter().product();
-    if labels != instance.triangles as u64 {
+    let labels = npy_io::whole_numbers(&bytes).map_err(|error| bad(&error))?.len();
+    if labels != instance.triangles {
         return Err(bad(&format!("{labels} labels; '{}' has {} triangles", instance.id, instance.triangles)));
     }
     Ok(bytes)

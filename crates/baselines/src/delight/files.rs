@@ -9,6 +9,7 @@ use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
+use mateval_pages::{figure, plain};
 use serde::Serialize;
 
 use super::room::FittedLight;
@@ -55,7 +56,8 @@ pub fn write(
     // Ids and names of lights contain no characters that are special in HTML.
     let introduction = "A photo is base colour times the light on a white surface, plus light that does not depend on \
                         base colour.";
-    std::fs::write(&index, page("De-lit photos", introduction, &sections)).map_err(FileError::io("write", &index))?;
+    std::fs::write(&index, plain("De-lit photos", introduction, &sections, ""))
+        .map_err(FileError::io("write", &index))?;
     work.finish()?;
     Ok(dataset.scenes.len())
 }
@@ -98,15 +100,15 @@ const PICTURES: [(&str, &str); 7] = [
 ];
 
 fn section(id: &str, delit: &DelitPhoto) -> String {
-    let mut text = format!("<section><h2>{id}</h2><div class=\"pictures\">\n");
+    let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
     text.extend(PICTURES.map(|(file, caption)| figure(&format!("{id}/{file}.png"), id, caption)));
     let (count, rounds) = (delit.lights.len(), delit.rounds);
     text.push_str(&format!(
-        "</div><details><summary>{count} lights after {rounds} rounds</summary><div class=\"scroll\"><table><tr>\
-         <th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr>\n"
+        "</div><details><summary>{count} lights after {rounds} rounds</summary><div class=\"wide\"><table><thead><tr>\
+         <th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr></thead><tbody>\n"
     ));
     text.extend(delit.lights.iter().map(|FittedLight { light, radiance: [r, g, b] }| {
-        format!("<tr><td>{}</td><td>{r:.4}</td><td>{g:.4}</td><td>{b:.4}</td></tr>\n", light.name)
+        format!("<tr><th scope=\"row\">{}</th><td>{r:.4}</td><td>{g:.4}</td><td>{b:.4}</td></tr>\n", light.name)
     }));
     text.push_str("</tbody></table></div></details></section>\n");
     text

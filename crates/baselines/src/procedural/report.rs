@@ -277,7 +277,7 @@ pub(super) fn html(method: &Method, scenes: &[(SceneReport, bool)]) -> String {
 
 fn section((scene, has_photo): &(SceneReport, bool)) -> String {
     let id = &scene.id;
-    let mut text = format!("<section><h2>{id}</h2><div class=\"pictures\">\n");
+    let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
     for (name, caption) in pictures(*has_photo) {
         text.push_str(&figure(&format!("{id}/{name}.png"), id, caption));
     }
@@ -307,7 +307,7 @@ fn pictures(has_photo: bool) -> Vec<(&'static str, &'static str)> {
 /// A part with its pictures and parameters.
 fn with_graph(id: &str, has_photo: bool, part: &PartReport, chosen: &GraphReport) -> String {
     let name = &part.part;
-    let mut text = format!("<h3>{name}: {}</h3><div class=\"pictures\">\n", escaped(&chosen.graph));
+    let mut text = format!("<h3>{name}: {}</h3><div class=\"row\">\n", escaped(&chosen.graph));
     for (picture, caption) in pictures(has_photo).into_iter().chain([("swatch", "The graph from the front")]) {
         text.push_str(&figure(&format!("{id}/{name}-{picture}.png"), name, caption));
     }
