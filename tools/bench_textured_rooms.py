@@ -58,7 +58,7 @@ TEXTURES = {
 
 # The words of `mateval baseline` for each submission.
 METHODS = {
-    "median-part": ["median-part"],
+    "median-part": ["median", "--parts"],
     "nn": ["nn"],
     "procedural": ["procedural"],
     "keep-seen": ["procedural", "--keep-seen"],

@@ -97,7 +97,7 @@ fn an_estimate_needs_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let medians = |name: &str, words: &[&str]| {
         let out = folder.path().join(name);
-        run(baseline("median-part", &DATASET, &out).args(words)).ends_with(0);
+        run(baseline("median", &DATASET, &out).arg("--parts").args(words)).ends_with(0);
         base_colors(&out)
     };
     let pictures = PICTURES.to_string_lossy();
@@ -111,93 +111,6 @@ fn an_estimate_needs_no_files() {
     run(baseline("nn", &DATASET, &folder.path().join("nn")).args(["--estimate", "delight", "--adapter", "plain"]))
         .ends_with(2)
         .says("--adapter describes the files of a folder");
-}
-
-fn relight(pictures: &Path, out: &Path, words: &[&str]) -> Run {
-    let mut command = baseline("relight", &DATASET, out);
-    run(command.arg(pictures).args(["--samples", "8"]).args(words))
-}
-
-/// The mean of the pixels that are valid.
-fn mean_of_valid(picture: &Picture<LinearRgb>) -> f64 {
-    let valid = png_io::read_mask(&DATASET.join("scenes/room/views/input/valid.png")).unwrap();
-    let values =
-        { picture.pixels().iter().zip(valid.pixels()) }.filter(|(_, valid)| **valid).map(|(v, _)| v.luminance());
-    values.sum::<f64>() / valid.pixels().iter().filter(|valid| **valid).count() as f64
-}
-
-/// Under its fitted lights the room is as bright as in the photo, without one of them darker, and without all of them
-/// black.
-#[test]
-fn a_room_is_lit_anew() {
-    let folder = tempfile::tempdir().unwrap();
-    let photo = exr_io::read_linear(&DATASET.join("scenes/room/views/input/rgb.exr")).unwrap();
-    let brightness = |name: &str, words: &[&str]| {
-        let out = folder.path().join(name);
-        relight(&PICTURES, &out, words).ends_with(0).prints("1 scene;");
-        mean_of_valid(&exr_io::read_linear(&out.join("room/relit.exr")).unwrap()) / mean_of_valid(&photo)
-    };
-    let fitted = brightness("fitted", &[]);
-    assert!((fitted - 1.0).abs() < 0.15, "{fitted}");
-    let without_lamp = brightness("without", &["--light", "lamp_shade=0"]);
-    assert!(without_lamp < 0.98 * fitted, "{without_lamp} {fitted}");
-    let twice = brightness("twice", &["--light", "lamp_shade=5", "--light", "lamp_shade=2"]);
-    brightness("fivefold", &["--light", "lamp_shade=5"]);
-    let page = |name: &str| std::fs::read_to_string(folder.path().join(name).join("index.html")).unwrap();
-    assert!(page("fivefold").contains("max=\"5\" step=\"any\" value=\"5\""));
-    // Light is linear, but the filter that takes noise out of it is not.
-    assert!(((twice - fitted) / (fitted - without_lamp) - 1.0).abs() < 0.15, "{twice} {fitted} {without_lamp}");
-    let lights = json(&PICTURES.join("room/lights.json"));
-    let all: Vec<String> =
-        lights["lights"].as_array().unwrap().iter().map(|l| format!("{}=0", l["name"].as_str().unwrap())).collect();
-    let words: Vec<&str> = all.iter().flat_map(|light| ["--light", light]).collect();
-    assert_eq!(brightness("dark", &words), 0.0);
-
-    let html = page("without");
-    assert!(
-        html.contains("value=\"0\"")
-            && html.contains("lamp_shade")
-            && !html.contains("http:")
-            && !html.contains("https:")
-    );
-    assert_eq!(html.matches("data-light=").count(), html.matches("type=\"range\"").count());
-    for picture in ["photo.png", "relit.png"] {
-        assert!(folder.path().join("without/room").join(picture).is_file(), "{picture}");
-    }
-}
-
-#[test]
-fn bad_lights() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
-    relight(&PICTURES, &out, &["--light", "sun=1"])
-        .ends_with(2)
-        .says("no scene has a light named sun")
-        .says("lamp_shade");
-    relight(&PICTURES, &out, &["--light", "lamp_shade"]).ends_with(2).says("expected NAME=FACTOR");
-    relight(&PICTURES, &out, &["--light", "lamp_shade=-1"]).ends_with(2).says("expected 0 to 1e6");
-    relight(&PICTURES, &out, &["--light", "lamp_shade=nan"]).ends_with(2).says("expected 0 to 1e6");
-    relight(&DATASET, &out, &[]).ends_with(2).says("holds no folder <scene>/");
-
-    let other = folder.path().join("pictures");
-    copy_folder(&PICTURES, &other);
-    let path = other.join("room/lights.json");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let write = |from: &str, to: &str| {
-        assert!(text.contains(from), "{from}");
-        std::fs::write(&path, text.replace(from, to)).unwrap();
-    };
-    write("mateval-fitted-lights/2", "mateval-fitted-lights/1");
-    relight(&other, &out, &[]).ends_with(2).says("mateval-fitted-lights/1");
-    write("lamp_shade", "sun");
-    relight(&other, &out, &[]).ends_with(2).says("its lights are not those of the scene");
-    write("\"room\"", "\"stage\"");
-    relight(&other, &out, &[]).ends_with(2).says("its lights are not those of the scene");
-    std::fs::write(&path, &text).unwrap();
-    let base_color = Picture::filled(8, 8, LinearRgb([0.5; 3]));
-    exr_io::write_linear(&other.join("room/base_color.exr"), &base_color, Precision::Float).unwrap();
-    relight(&other, &out, &[]).ends_with(2).says("it has 8x8 pixels, the photo 96x72");
-    assert!(!out.exists());
 }
 
 /// A scene without a photo, a photo of another size, a black one, and a place inside the dataset.

@@ -1,4 +1,4 @@
-//! `baseline nn`, `median`, `median-part`: seen texels get the colours of the estimate, no colour is transferred to
+//! `baseline nn`, `median`: seen texels get the colours of the estimate, no colour is transferred to
 //! another instance, and the encodings of estimates are decoded correctly.
 
 use std::path::{Path, PathBuf};
@@ -95,7 +95,8 @@ fn a_lifted_estimate_is_rendered_back_as_the_estimate() {
 fn baselines_score_in_the_expected_order() {
     let input = |summary: &Value| psnr(summary, "albedo.input");
     let gt = ["--estimate", "gt"];
-    let [part, instance] = ["median-part", "median"].map(|name| input(&scored(&ROOM, name, &gt)));
+    let by_part = [&gt[..], &["--parts"]].concat();
+    let [part, instance] = [&by_part[..], &gt].map(|words| input(&scored(&ROOM, "median", words)));
     let (nn, grey) = (input(&NN), input(&scored(&ROOM, "grey", &[])));
     assert!(nn > part + 5.0 && part >= instance && instance > grey + 5.0, "{nn} {part} {instance} {grey}");
 }
@@ -295,7 +296,7 @@ fn an_estimate_that_cannot_be_lifted_is_refused_with_the_reason() {
     nn(&["--estimate", &here, "--adapter", "marigold"]).says("albedo.png");
     nn(&["--estimate", &here, "--adapter", "no-such"]).says("colorful-shading");
     let mut command = mateval();
-    command.args(["baseline", "median-part", "--part-set", "none", "--estimate", "gt", "--dataset"]).arg(&*ROOM);
+    command.args(["baseline", "median", "--parts", "--part-set", "none", "--estimate", "gt", "--dataset"]).arg(&*ROOM);
     run(command.arg("--out").arg(&out)).ends_with(2).says("no part set 'none'");
     assert!(!out.exists());
 }
@@ -400,8 +401,8 @@ fn partfield_meshes_are_exported_and_its_labels_become_a_second_set_of_parts() {
     let parts = scene["part_sets"][0]["parts"].as_array().unwrap();
     assert_eq!(parts.iter().filter(|part| part["instance"] == "red").count(), 3);
     let out = folder.path().join("median");
-    let words = ["--estimate", "gt", "--part-set", "partfield"];
-    run(baseline("median-part", &again, &out).args(words)).ends_with(0);
+    let words = ["--estimate", "gt", "--parts", "--part-set", "partfield"];
+    run(baseline("median", &again, &out).args(words)).ends_with(0);
     assert!(is_all(&again, &out, "red", [0.8, 0.1, 0.1]));
 
     std::fs::write(clusters.join("room-00002_0_01.npy"), npy(&[0; 11])).unwrap();

@@ -164,7 +164,7 @@ fn the_report_shows_what_was_baked() {
             && !html.contains("https:")
     );
     let text = std::fs::read_to_string(report().join("room/materials.mtlx")).unwrap();
-    let graph = mateval_procedural::mtlx::read_text("materials.mtlx", &text, &Default::default()).unwrap();
+    let graph = mateval_procedural::mtlx::read_text("materials.mtlx", &text).unwrap();
     let size = |name: &str| graph.parameters[graph.parameter(name).unwrap()].value.numbers()[0];
     let mut sizes = [size("size_u"), size("size_v")];
     sizes.sort_by(f64::total_cmp);

@@ -5,14 +5,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::submission::Map;
-use mateval_dataset::submission::StoredEncoding;
+use mateval_dataset::submission::{Map, StoredEncoding};
 use mateval_files::FileError;
 use mateval_image::texture_io::read_texture;
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
 use serde::Deserialize;
 
-use crate::error::{AdapterError, BaselineError};
+use crate::error::BaselineError;
 use crate::estimate::{Estimate, Placement};
 
 /// The built-in adapters, by name.
@@ -59,11 +58,11 @@ impl Adapter {
         }
         let path = Path::new(name);
         if !path.is_file() {
-            return Err(BaselineError::NoAdapter { name: name.to_owned(), known: Self::names().join(", ") });
+            let known = Self::names().join(", ");
+            let why = format!("is neither a built-in adapter nor a file; expected one of {known}, or a TOML file");
+            return Err(BaselineError::unusable(path, why));
         }
-        let text = std::fs::read_to_string(path);
-        let text = text.map_err(FileError::io("read", path))?;
-        Self::parse(&text, path)
+        Self::parse(&std::fs::read_to_string(path).map_err(FileError::io("read", path))?, path)
     }
 
     /// The names of the built-in adapters.
@@ -72,17 +71,21 @@ impl Adapter {
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self, BaselineError> {
-        let invalid = |source: AdapterError| BaselineError::BadAdapter { path: path.to_owned(), source };
-        let adapter: Self = toml::from_str(text).map_err(|error| invalid(error.into()))?;
-        let maps = [&adapter.base_color, &adapter.roughness, &adapter.metallic];
-        if maps.iter().all(|map| map.is_none()) {
-            return Err(invalid(AdapterError::NoMap));
+        let invalid = |why: &str| BaselineError::Unusable(format!("adapter '{}': {why}", path.display()));
+        let adapter: Self = toml::from_str(text).map_err(|error| invalid(&error.to_string()))?;
+        if adapter.maps().next().is_none() {
+            return Err(invalid("it names no file; expected base_color, roughness or metallic"));
         }
         if adapter.base_color.as_ref().is_some_and(|file| file.channel.is_some()) {
-            return Err(invalid(AdapterError::ColorChannel));
+            return Err(invalid("base_color has a `channel`; only roughness and metallic may have one"));
         }
-        for map in maps.into_iter().flatten() {
-            map.check().map_err(invalid)?;
+        for (_, AdaptedFile { files, range, .. }, _) in adapter.maps() {
+            if files.is_empty() {
+                return Err(invalid("`files` is empty; expected at least one path"));
+            }
+            if !(range[1] > range[0] && range.iter().all(|v| v.is_finite())) {
+                return Err(invalid(&format!("range {range:?}; expected a smaller number, then a larger one")));
+            }
         }
         Ok(adapter)
     }
@@ -168,9 +171,6 @@ impl Adapter {
     }
 }
 
-/// The placeholder for the scene's id in a path.
-const SCENE: &str = "{scene}";
-
 /// The largest linear value of an estimate. Materials end at 1 or little above; far larger numbers, such as those from
 /// 0 to 255, have another range than the adapter states.
 const LARGEST: f32 = 16.0;
@@ -224,7 +224,6 @@ fn unit_range() -> [f32; 2] {
     [0.0, 1.0]
 }
 
-/// A channel of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
@@ -241,17 +240,6 @@ pub(crate) struct Stored {
 }
 
 impl AdaptedFile {
-    /// Fails where no path is given, or where the range is empty or not finite.
-    pub(crate) fn check(&self) -> Result<(), AdapterError> {
-        if self.files.is_empty() {
-            return Err(AdapterError::NoFiles);
-        }
-        if !(self.range[1] > self.range[0] && self.range.iter().all(|v| v.is_finite())) {
-            return Err(AdapterError::Range(self.range));
-        }
-        Ok(())
-    }
-
     /// The linear picture; `channel` selects a scalar, which is repeated in all three channels. Absent if an optional
     /// file is missing.
     pub(crate) fn read(
@@ -261,26 +249,42 @@ impl AdaptedFile {
         channel: Option<Channel>,
     ) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
         let Some(Stored { path, numbers }) = self.stored(folder, scene, channel)? else { return Ok(None) };
+        let refused = |why: String| Err(BaselineError::unusable(&path, why));
         let below = numbers.pixels().iter().filter(|rgb| rgb.iter().any(|value| *value < LEAST)).count();
         if below as f64 > MOST_BELOW * numbers.pixels().len() as f64 {
             let value = numbers.pixels().iter().flatten().copied().filter(|v| v.is_finite()).fold(0.0, f32::min);
-            return Err(BaselineError::TooSmall { path, value, share: below as f64 / numbers.pixels().len() as f64 });
+            let percent = 100.0 * (below as f64 / numbers.pixels().len() as f64);
+            return refused(format!(
+                "holds {value}, and {percent:.0} % of its pixels are below 0, in the adapter's `range`; expected 0 to 1; \
+                 if the numbers run from -1 to 1, write range = [-1.0, 1.0] below the map in the adapter"
+            ));
         }
         let picture = numbers.map(|rgb| LinearRgb(rgb.map(|value| self.encoding.decode(value))));
         let picture = self.scale.apply(picture);
         let too_large = |rgb: &LinearRgb| rgb.0.into_iter().find(|value| value.is_finite() && value.abs() > LARGEST);
         if let Some(value) = picture.pixels().iter().find_map(too_large) {
-            return Err(BaselineError::TooLarge { path, value, largest: LARGEST });
+            return refused(format!(
+                "holds {value} after decoding; expected linear values up to {LARGEST}; if the numbers run from 0 to 255, \
+                 write range = [0, 255] below the map in the adapter"
+            ));
         }
         if let Some(at) = picture.pixels().iter().position(|LinearRgb(rgb)| !rgb.iter().all(|v| v.is_finite())) {
-            let pixel = (at % picture.width(), at / picture.width());
-            return Err(BaselineError::NotFinite { path, pixel });
+            return Err(BaselineError::Unusable(format!(
+                "'{}': pixel {:?} is not finite after decoding; fix the adapter's `encoding` or `range`, or the picture",
+                path.display(),
+                (at % picture.width(), at / picture.width())
+            )));
         }
         let bright = picture.pixels().iter().filter(|LinearRgb(rgb)| rgb.iter().any(|v| *v > BRIGHT)).count();
         let share = bright as f64 / picture.pixels().len() as f64;
         if self.scale == Scale::Absolute && share > MOST_BRIGHT {
             let value = picture.pixels().iter().flat_map(|LinearRgb(rgb)| *rgb).fold(0.0, f32::max);
-            return Err(BaselineError::ManyTooLarge { path, value, bright: BRIGHT, share });
+            return refused(format!(
+                "holds values up to {value} after decoding, and {:.0} % of its pixels are above {BRIGHT}; expected linear \
+                 values from 0 to 1; write range = [0, MAX] below the map in the adapter, where MAX is the stored number \
+                 that stands for 1, or scale = \"free\" if nobody knows it",
+                100.0 * share
+            ));
         }
         Ok(Some(picture))
     }
@@ -294,8 +298,9 @@ impl AdaptedFile {
         channel: Option<Channel>,
     ) -> Result<Option<Stored>, BaselineError> {
         let path = match self.path(folder, scene) {
-            Err(BaselineError::NoEstimate { .. }) if self.optional => return Ok(None),
-            path => path?,
+            Ok(path) => path,
+            Err(_) if self.optional => return Ok(None),
+            Err(searched) => return Err(no_estimate(&searched)),
         };
         // Read without decoding: the adapter states the encoding, of float files too.
         let stored = read_texture(&path, texture_io::Encoding::Linear, Wrap::Clamp)?;
@@ -303,26 +308,36 @@ impl AdaptedFile {
             && self.scale == Scale::Absolute
             && let Some(largest) = largest_byte_of_words(&stored)
         {
-            return Err(BaselineError::BytesInWords { path, largest, high: largest_byte_share() });
+            let high = LARGEST_BYTE.end() / LARGEST_WORD;
+            let why = format!(
+                "holds 16-bit integers that reach only {largest} of 65535; expected 65535 for 1; save them as 8-bit \
+                 integers, or write range = [0.0, {high}] (255 of 65535) below the map in the adapter"
+            );
+            return Err(BaselineError::unusable(&path, why));
         }
         let [low, high] = self.range;
         let numbers = Picture::from_fn(stored.width(), stored.height(), |x, y| {
-            selected(channel, stored.texel(x, y)).map(|value| (value - low) / (high - low))
+            let rgb = stored.texel(x, y);
+            // A scalar is repeated.
+            let rgb = channel.map_or(rgb, |channel| [rgb[channel as usize]; 3]);
+            rgb.map(|value| (value - low) / (high - low))
         });
         Ok(Some(Stored { path, numbers }))
     }
 
-    /// The first path that exists.
-    pub(crate) fn path(&self, folder: &Path, scene: &str) -> Result<PathBuf, BaselineError> {
-        let paths: Vec<PathBuf> = self.files.iter().map(|file| folder.join(file.replace(SCENE, scene))).collect();
+    /// The first path that exists, or else all that were searched.
+    pub(crate) fn path(&self, folder: &Path, scene: &str) -> Result<PathBuf, Vec<PathBuf>> {
+        let paths: Vec<PathBuf> = self.files.iter().map(|file| folder.join(file.replace("{scene}", scene))).collect();
         let found = paths.iter().find(|path| path.is_file()).cloned();
-        found.ok_or(BaselineError::NoEstimate { paths })
+        found.ok_or(paths)
     }
 }
 
-/// What a byte's largest number is as a share of a 16-bit integer's.
-fn largest_byte_share() -> f32 {
-    LARGEST_BYTE.end() / LARGEST_WORD
+/// None of the searched files exists.
+pub(crate) fn no_estimate(searched: &[PathBuf]) -> BaselineError {
+    let paths: Vec<String> = searched.iter().map(|path| format!("'{}'", path.display())).collect();
+    let expected = paths.join(" or ");
+    BaselineError::Unusable(format!("no estimate: expected {expected}; fix the adapter's `files`, or run the method"))
 }
 
 /// The largest number of 16-bit integers that are those of bytes; `None` for all other numbers.
@@ -338,16 +353,6 @@ fn largest_byte_of_words(stored: &Texture) -> Option<u8> {
         }
     }
     LARGEST_BYTE.contains(&largest).then_some(largest as u8)
-}
-
-/// The channel's value three times, or all three channels where none is selected.
-fn selected(channel: Option<Channel>, rgb: [f32; 3]) -> [f32; 3] {
-    match channel {
-        None => rgb,
-        Some(Channel::R) => [rgb[0]; 3],
-        Some(Channel::G) => [rgb[1]; 3],
-        Some(Channel::B) => [rgb[2]; 3],
-    }
 }
 
 /// After a picture of free scale is scaled, this share of its pixels has its largest channel at or below 1.

@@ -10,7 +10,7 @@
 //! mesh into parts. [`export_partfield`] writes the meshes. [`import_partfield`] copies PartField's labels to where
 //! `part_labels` in a recipe expects them; a dataset built from that recipe has a second part set.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
@@ -18,6 +18,7 @@ use mateval_dataset::dataset::Instance;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, Report, SceneId, TriangleMesh};
 use mateval_files::FileError;
+use mateval_files::untrusted::read_at_most;
 use mateval_files::whole::write_whole;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{Precision, write_linear};
@@ -25,7 +26,7 @@ use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, npy_io, png_io};
 use serde_json::json;
 
-use crate::error::{BaselineError, LabelsError};
+use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::estimate_source::EstimateSource;
 use crate::geometry::{SceneGeometry, SeenPixels};
@@ -87,14 +88,13 @@ pub fn export_texgen(
     for scene in &dataset.scenes {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene, progress)?;
-        if estimate.base_color.is_none() {
-            return Err(BaselineError::NoColor(scene.id.to_string()));
-        }
+        estimate.needs_color(&scene.id)?;
         let seen = seen_pixels(&geometry, &estimate)?;
-        for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
+        for at in geometry.with_atlas() {
+            let instance = &scene.instances[at];
             progress(Report::step(&format!("{} export", scene.id), at, scene.instances.len()));
             let known = lift(&geometry, &seen, &estimate, at, TEXELS);
-            if !known.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_))) {
+            if known.texels.pixels().iter().all(|texel| texel.seen().is_none()) {
                 continue;
             }
             let id = object_id(&scene.id, instance);
@@ -115,19 +115,12 @@ pub fn export_texgen(
 
 fn write_object(folder: &Path, mesh: &TriangleMesh, known: &PartialAtlas) -> Result<(), BaselineError> {
     write_whole(&folder.join("model.obj"), obj_text(mesh).as_bytes())?;
+    let shown = |texel: Texel| texel.seen().map_or([0; 3], |[r, g, b, ..]| srgb_bytes([r, g, b]));
     png_io::write_rgb_bytes(&folder.join("model.png"), &known.texels.map(shown))?;
     png_io::write_mask(&folder.join("mask.png"), &known.texels.map(|texel| texel != Texel::Unused))?;
-    let is_seen = |texel| matches!(texel, Texel::Seen(_));
-    png_io::write_mask(&folder.join("mask_partial.png"), &known.texels.map(is_seen))?;
+    png_io::write_mask(&folder.join("mask_partial.png"), &known.texels.map(|texel| texel.seen().is_some()))?;
     write_linear(&folder.join("position.exr"), &positions(mesh, known), Precision::Float)?;
     Ok(())
-}
-
-fn shown(texel: Texel) -> [u8; 3] {
-    match texel {
-        Texel::Seen([r, g, b, ..]) => srgb_bytes([r, g, b]),
-        Texel::Unused | Texel::Unseen => [0; 3],
-    }
 }
 
 /// The place of each texel in TEXGen's space: (x, -z, y), centred, with the longest side 1; 0 outside the surface.
@@ -167,17 +160,10 @@ fn picture(seen: &SeenPixels, estimate: &Estimate, instance: usize) -> Picture<[
     })
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Imported {
-    /// Number of instances in the submission.
-    pub instances: usize,
-    /// Number of those with a texture by TEXGen.
-    pub textured: usize,
-}
-
 /// Writes a submission. Seen texels hold the estimate; the base colour of all others is that of `results/<id>.png`
 /// (sRGB, any square size) at their uv. An instance without such a file, and roughness and metallic everywhere, are as
 /// `nn` with its defaults makes them from the same estimate. Fails where no file exists for any instance.
+/// Returns the number of instances in the submission, and of those with a texture by TEXGen.
 pub fn import_texgen(
     dataset: &Dataset,
     results: &Path,
@@ -185,11 +171,13 @@ pub fn import_texgen(
     force: bool,
     source: &EstimateSource,
     progress: Progress<'_>,
-) -> Result<Imported, BaselineError> {
+) -> Result<(usize, usize), BaselineError> {
     let textured = dataset.scenes.iter().flat_map(|scene| scene.instances.iter().map(move |i| object_id(&scene.id, i)));
     let textured = textured.filter(|id| file(results, id).is_file()).count();
     if textured == 0 {
-        return Err(BaselineError::NoTextures(results.to_owned()));
+        let why = "holds no <id>.png for any object of this dataset, such as living-00012.png; expected TEXGen's results \
+                   for the objects of `baseline texgen-export`";
+        return Err(BaselineError::unusable(results, why));
     }
     let description = format!(
         "TEXGen's textures where the input view shows nothing, {} where it does; {textured} textures; the rest as nn",
@@ -200,26 +188,23 @@ pub fn import_texgen(
     let instances = submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene, progress)?;
-        if estimate.base_color.is_none() {
-            return Err(BaselineError::NoColor(scene.id.to_string()));
-        }
+        estimate.needs_color(&scene.id)?;
         let (seen, options) = (nn::seen_pixels(&geometry, &estimate)?, NnOptions::default());
         nn::lift_scene(&geometry, &estimate, &seen, &options, progress, |at, known, medians| {
             let instance = &geometry.scene.instances[at];
             let path = file(results, &object_id(&scene.id, instance));
             let texture = path.is_file().then(|| read_texture(&path, Encoding::Srgb, Wrap::Clamp)).transpose()?;
-            let maps = match (known, texture) {
-                (Some(mut lifted), Some(texture)) => {
-                    composite(&mut lifted, &texture);
+            let maps = match known {
+                Some(mut lifted) => {
+                    texture.iter().for_each(|texture| composite(&mut lifted, texture));
                     Maps::of_atlas(&lifted.whole, estimate.given_maps())
                 }
-                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, estimate.given_maps()),
-                (None, _) => Maps::constant(medians.of(&geometry, at), estimate.given_maps()),
+                None => Maps::constant(medians.of(&geometry, at), estimate.given_maps()),
             };
             maps.write(&folder.join(instance.id.as_str()))
         })
     })?;
-    Ok(Imported { instances, textured })
+    Ok((instances, textured))
 }
 
 fn file(results: &Path, id: &str) -> PathBuf {
@@ -248,8 +233,8 @@ pub fn export_partfield(dataset: &Dataset, out: &Path) -> Result<usize, Baseline
     let mut count = 0;
     for scene in &dataset.scenes {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
-            let path = work.path().join(object_id(&scene.id, instance)).with_extension("obj");
+        for at in geometry.with_atlas() {
+            let path = work.path().join(object_id(&scene.id, &scene.instances[at])).with_extension("obj");
             write_whole(&path, obj_text(geometry.mesh(at)).as_bytes())?;
             count += 1;
         }
@@ -277,7 +262,11 @@ pub fn import_partfield(dataset: &Dataset, clusters: &Path, parts: u8, out: &Pat
         }
     }
     if count == 0 {
-        return Err(BaselineError::NoLabels { folder: clusters.to_owned(), parts });
+        let why = format!(
+            "holds no <id>_0_{parts:02}.npy for any instance, such as living-00012_0_{parts:02}.npy, nor one with fewer \
+             parts; expected PartField's results for the meshes of `baseline partfield-export`"
+        );
+        return Err(BaselineError::unusable(clusters, why));
     }
     work.finish()?;
     Ok(count)
@@ -291,12 +280,14 @@ fn labels_of(clusters: &Path, scene: &SceneId, instance: &Instance, parts: u8) -
 
 /// The file's bytes, if it holds one label per triangle.
 fn checked_labels(path: &Path, instance: &Instance) -> Result<Vec<u8>, BaselineError> {
-    let bad = |source: LabelsError| BaselineError::BadLabels { path: path.to_owned(), source };
-    let bytes = mateval_files::untrusted::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.into()))?;
-    let labels = npy_io::whole_numbers(&bytes).map_err(|error| bad(error.into()))?.len();
+    let bad = |reason: &dyn Display| {
+        let advice = "export the instances again and run PartField on them";
+        BaselineError::Unusable(format!("'{}': {reason}; {advice}", path.display()))
+    };
+    let bytes = read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(&error))?;
+    let labels = npy_io::whole_numbers(&bytes).map_err(|error| bad(&error))?.len();
     if labels != instance.triangles {
-        let (instance, triangles) = (instance.id.to_string(), instance.triangles);
-        return Err(bad(LabelsError::Count { labels, instance, triangles }));
+        return Err(bad(&format!("{labels} labels; '{}' has {} triangles", instance.id, instance.triangles)));
     }
     Ok(bytes)
 }

@@ -15,10 +15,10 @@ use mateval_image::{LinearRgb, Mask, Picture, png_io};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::adapter::{AdaptedFile, Adapter, Channel};
+use crate::adapter::{AdaptedFile, Adapter, Channel, no_estimate};
 use crate::encoding_fit::{Candidate, EncodingFit, FittedEncoding, Sample, Verdict, fit};
 use crate::error::BaselineError;
-use crate::estimate::Placement;
+use crate::estimate::{Placement, other_proportions};
 use crate::geometry::input_view;
 
 /// The value of `format` for this version of the report.
@@ -180,15 +180,15 @@ pub fn report(
         for (done, scene) in dataset.scenes.iter().enumerate() {
             progress(Report::step(&format!("{} encoding", map.stem()), done, dataset.scenes.len()));
             match file.path(folder, scene.id.as_str()) {
-                Err(BaselineError::NoEstimate { paths }) => searched.extend(paths),
-                Err(other) => return Err(other),
+                Err(paths) => searched.extend(paths),
                 Ok(_) if !is_stated(scene, map) => {
                     unstated.insert(map.stem());
                 }
                 Ok(_) => {
-                    let Some(picture) = ScenePicture::read(dataset, scene, folder, (map, file, channel))? else {
-                        continue;
-                    };
+                    let Some(stored) = file.stored(folder, scene.id.as_str(), None)? else { continue };
+                    let view = InputView::read(dataset, scene, map)?;
+                    let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
+                    let picture = ScenePicture { map, channel, stored: stored.numbers, view, most };
                     for (samples, reading) in samples.iter_mut().zip(&readings) {
                         samples.add(scene, &picture, adapter.placement, *reading)?;
                     }
@@ -201,11 +201,17 @@ pub fn report(
         }
     }
     if maps.is_empty() && !unstated.is_empty() {
-        return Err(BaselineError::UnstatedTruth { maps: unstated.into_iter().collect() });
+        let maps: Vec<&str> = unstated.into_iter().collect();
+        return Err(BaselineError::Unusable(format!(
+            "cannot compare {}: no scene that has such a picture has a source that states it; expected source.states_{} = \
+             true in the dataset; use another dataset, or compare base_color",
+            maps.join(" and "),
+            maps.join(" or source.states_")
+        )));
     }
     if maps.is_empty() {
         searched.truncate(MOST_NAMED_PATHS);
-        return Err(BaselineError::NoEstimate { paths: searched });
+        return Err(no_estimate(&searched));
     }
     let agrees = maps.iter().all(|map| map.agrees);
     Ok(EncodingReport { format: ENCODING_FORMAT.to_owned(), adapter: adapter.name.clone(), agrees, maps })
@@ -264,21 +270,6 @@ struct ScenePicture {
     most: usize,
 }
 
-impl ScenePicture {
-    /// The file's picture and the view that it shows; absent if an optional file is missing.
-    fn read(
-        dataset: &Dataset,
-        scene: &SceneFile,
-        folder: &Path,
-        (map, file, channel): (Map, &AdaptedFile, Option<Channel>),
-    ) -> Result<Option<Self>, BaselineError> {
-        let Some(stored) = file.stored(folder, scene.id.as_str(), None)? else { return Ok(None) };
-        let view = InputView::read(dataset, scene, map)?;
-        let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
-        Ok(Some(Self { map, channel, stored: stored.numbers, view, most }))
-    }
-}
-
 /// The samples of one map in one reading.
 #[derive(Default)]
 struct Samples {
@@ -301,18 +292,9 @@ impl Samples {
         let (size, view_size) = ((stored.width(), stored.height()), (view.valid.width(), view.valid.height()));
         let placement = if reading == Reading::CentreCrop { Placement::CentreCrop } else { placement };
         let region = placement.region(size, view_size);
-        let region = region.ok_or_else(|| BaselineError::Proportions {
-            scene: scene.id.to_string(),
-            size,
-            view: view_size,
-            adapted: true,
-        })?;
-        let channels: &[usize] = match (map, channel) {
-            (Map::BaseColor, _) => &[0, 1, 2],
-            (_, Some(Channel::G)) => &[1],
-            (_, Some(Channel::B)) => &[2],
-            _ => &[0],
-        };
+        let region = region.ok_or_else(|| other_proportions(scene.id.as_str(), size, view_size, true))?;
+        let scalar = [channel.unwrap_or(Channel::R) as usize];
+        let channels = if *map == Map::BaseColor { &[0, 1, 2][..] } else { &scalar };
         for (x, y) in view.pixels(*most) {
             let Some(at) = region.pixel(size, DVec2::new(x as f64, y as f64) + 0.5) else { continue };
             let (sx, sy) = reading.pixel(size, at);

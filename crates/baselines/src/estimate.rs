@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use glam::DVec2;
+use mateval_dataset::SceneId;
 use mateval_image::{LinearRgb, Picture};
 use serde::Deserialize;
 
@@ -54,10 +55,20 @@ impl Estimate {
     /// The part of a view of this width and height that the pictures show; `scene` is for the error. Fails without any
     /// picture, and where the pictures have other proportions than their placement allows.
     pub fn region(&self, scene: &str, view: (usize, usize)) -> Result<Region, BaselineError> {
-        let scene = scene.to_owned();
-        let Some(size) = self.size() else { return Err(BaselineError::EmptyEstimate(scene)) };
+        let Some(size) = self.size() else {
+            return Err(BaselineError::Unusable(format!("the estimate of scene '{scene}' holds no picture")));
+        };
         let region = self.placement.unwrap_or_default().region(size, view);
-        region.ok_or(BaselineError::Proportions { scene, size, view, adapted: self.placement.is_some() })
+        region.ok_or_else(|| other_proportions(scene, size, view, self.placement.is_some()))
+    }
+
+    /// Fails without base colour, for methods that paint it.
+    pub(crate) fn needs_color(&self, scene: &SceneId) -> Result<(), BaselineError> {
+        if self.base_color.is_some() {
+            return Ok(());
+        }
+        let why = "has no base_color; give an estimate with base_color";
+        Err(BaselineError::Unusable(format!("the estimate of scene '{scene}' {why}")))
     }
 
     /// Fails where its pictures differ in size; `folder` and `scene` are for the error.
@@ -67,10 +78,14 @@ impl Estimate {
         let sizes: Vec<(usize, usize)> = scalars.map(|picture| (picture.width(), picture.height())).collect();
         match sizes.into_iter().find(|other| *other != size) {
             None => Ok(self),
-            Some(other) => {
-                let (folder, scene) = (folder.to_owned(), scene.to_owned());
-                Err(BaselineError::Sizes { folder, scene, sizes: [size, other] })
-            }
+            Some(other) => Err(BaselineError::Unusable(format!(
+                "the estimate of scene '{scene}' in '{}' has pictures of {}x{} and of {}x{} pixels; expected one size",
+                folder.display(),
+                size.0,
+                size.1,
+                other.0,
+                other.1
+            ))),
         }
     }
 
@@ -80,6 +95,27 @@ impl Estimate {
         let scalar = |picture: &Option<Picture<f32>>| picture.as_ref().map_or(0.0, |picture| picture.get(x, y));
         [r, g, b, scalar(&self.roughness), scalar(&self.metallic)]
     }
+}
+
+/// An estimate of this width and height has other proportions than the view; `adapted` where an adapter describes it.
+pub(crate) fn other_proportions(
+    scene: &str,
+    size: (usize, usize),
+    view: (usize, usize),
+    adapted: bool,
+) -> BaselineError {
+    let advice = if adapted {
+        "write placement = \"stretched\" at the top of the adapter, or placement = \"centre_crop\" if it cuts off what lies \
+         outside its own proportions"
+    } else {
+        "scale it back to the view's proportions; if it cuts off a part of the view, save its pictures and lift them with \
+         an adapter that states placement = \"centre_crop\": mateval baseline nn --estimate FOLDER --adapter FILE.toml"
+    };
+    BaselineError::Unusable(format!(
+        "the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions, within 5 %; \
+         if the method stretches the view to its own size, {advice}",
+        size.0, size.1, view.0, view.1
+    ))
 }
 
 /// Largest relative difference between the proportions of a [`Placement::Whole`] picture and the view, because methods

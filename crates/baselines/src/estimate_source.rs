@@ -16,7 +16,7 @@ use crate::adapter::Adapter;
 use crate::delight::{CandidateLights, DelightOptions, delight};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Placement};
-use crate::geometry::{SceneGeometry, input_view};
+use crate::geometry::{SceneGeometry, input_view, photo_file};
 
 /// The most files that are named as not read.
 const MOST_NAMED: usize = 5;
@@ -127,7 +127,9 @@ impl EstimateSource {
 fn truth(folder: &SceneFolder, view: &View) -> Result<Estimate, BaselineError> {
     let folder = folder.truth_view(&view.id);
     if !folder.is_dir() {
-        return Err(BaselineError::TruthWithheld(folder));
+        let why = "does not exist: this copy of the dataset holds no ground truth, from which the estimate 'gt' (the \
+                   default) is taken; give --estimate input, delight, or a folder of your method's pictures";
+        return Err(BaselineError::unusable(&folder, why));
     }
     Ok(Estimate {
         base_color: Some(read_linear(&folder.join("albedo.exr"))?),
@@ -138,10 +140,7 @@ fn truth(folder: &SceneFolder, view: &View) -> Result<Estimate, BaselineError> {
 }
 
 fn photo(folder: &SceneFolder, view: &View, exposure: f32) -> Result<Estimate, BaselineError> {
-    let path = folder.view(&view.id).join("rgb.exr");
-    if !path.is_file() {
-        return Err(BaselineError::NoPhoto(path));
-    }
-    let shown = read_linear(&path)?.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (v * exposure).clamp(0.0, 1.0))));
+    let shown = read_linear(&photo_file(folder, view)?)?
+        .map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (v * exposure).clamp(0.0, 1.0))));
     Ok(Estimate { base_color: Some(shown), ..Estimate::default() })
 }

@@ -1,7 +1,8 @@
 //! A scene as methods see it: the instances' meshes with their atlas uv, rays through them, which instance each pixel
 //! of an estimate shows and where on its surface, and the part that each triangle belongs to.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -53,6 +54,11 @@ impl<'a> SceneGeometry<'a> {
         Ok(Self { scene, view, folder, world, valid, instances })
     }
 
+    /// The places of the instances that have an atlas.
+    pub fn with_atlas(&self) -> Vec<usize> {
+        (0..self.scene.instances.len()).filter(|at| self.scene.instances[*at].atlas.is_some()).collect()
+    }
+
     /// An instance's mesh, whose uv are those of the atlas.
     pub fn mesh(&self, instance: usize) -> &TriangleMesh {
         &self.world.scene().surfaces[instance].mesh
@@ -72,8 +78,15 @@ impl<'a> SceneGeometry<'a> {
 
 /// The input view, which estimates are made for.
 pub(crate) fn input_view<'a>(folder: &SceneFolder, scene: &'a SceneFile) -> Result<&'a View, BaselineError> {
-    let missing = || BaselineError::NoInputView(folder.scene_file());
-    scene.view(INPUT).ok_or_else(missing)
+    let why = "has no view 'input'; run `mateval prep verify`";
+    scene.view(INPUT).ok_or_else(|| BaselineError::unusable(&folder.scene_file(), why))
+}
+
+/// The picture of a view, linear and before exposure.
+pub(crate) fn photo_file(folder: &SceneFolder, view: &View) -> Result<PathBuf, BaselineError> {
+    let path = folder.view(&view.id).join("rgb.exr");
+    let why = "does not exist: the scene has not been rendered; run `mateval prep render`";
+    if path.is_file() { Ok(path) } else { Err(BaselineError::unusable(&path, why)) }
 }
 
 /// Marks pixels that show no instance.
@@ -234,6 +247,11 @@ impl<'a> PartTriangles<'a> {
             (0..mesh.triangles.len()).map(|triangle| known.get(&corners(mesh, triangle)).copied()).collect()
         });
         Ok(Self { parts, of_instance: of_instance.collect(), owners })
+    }
+
+    /// The place of each part by its index in pictures.
+    pub(crate) fn place_of_index(&self) -> BTreeMap<u16, usize> {
+        self.parts.iter().enumerate().map(|(at, part)| (part.index.0.get(), at)).collect()
     }
 
     /// The index of the part of each triangle of an instance.

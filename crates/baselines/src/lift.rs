@@ -28,6 +28,12 @@ pub enum Texel {
     Seen(Values),
 }
 
+impl Texel {
+    pub fn seen(self) -> Option<Values> {
+        if let Self::Seen(values) = self { Some(values) } else { None }
+    }
+}
+
 /// An instance's atlas with the texels that are known.
 pub struct PartialAtlas {
     /// The triangle that each texel belongs to.
@@ -36,81 +42,6 @@ pub struct PartialAtlas {
 }
 
 /// Writes the estimate into the atlas of one instance, which has `size` x `size` texels.
-///
-/// # Examples
-///
-/// A wall is 4 m wide, and the camera sees its left half. The texels there get the estimate's colour:
-///
-/// ```
-/// use std::sync::Arc;
-///
-/// use glam::{DVec3, Vec2, Vec3};
-/// use mateval_baselines::estimate::Estimate;
-/// use mateval_baselines::geometry::SceneGeometry;
-/// use mateval_baselines::lift::{Texel, lift};
-/// use mateval_baselines::geometry::SeenPixels;
-/// use mateval_image::{LinearRgb, Picture};
-/// use mateval_dataset::layout::SceneFolder;
-/// use mateval_dataset::material::{ColorInput, Material, MaterialModel};
-/// use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
-/// use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
-/// use mateval_tracer::World;
-/// use serde_json::json;
-///
-/// // Scene: a wall whose atlas covers it from left to right.
-/// let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
-/// let mesh = TriangleMesh {
-///     positions: corners.map(|c| Vec3::new(4.0 * c.x - 1.0, 2.0 * c.y - 1.0, -2.0)).into(),
-///     uvs: Some(corners.into()),
-///     triangles: vec![[0, 1, 2], [0, 2, 3]],
-///     normals: None,
-/// };
-/// let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-/// let world = World::new(Arc::new(ReferenceScene {
-///     surfaces: vec![Surface { name: "wall".into(), mesh, material: MaterialIndex(0) }],
-///     materials: vec![Material { name: "grey".into(), model, two_sided: true, opacity: None, bump: None }],
-///     ..Default::default()
-/// }))?;
-///
-/// // Input view: from 2 m away the picture shows 2 m of the wall.
-/// let intrinsics = Intrinsics::from_fov_x(8, 8, 2.0 * f64::atan(0.5));
-/// let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
-/// let scene = serde_json::from_value(json!({
-///     "format": "mateval/3",
-///     "id": "room",
-///     "source": {
-///         "kind": "bitterli", "house": "room", "states_roughness": true, "states_metallic": true, "files": []
-///     },
-///     "lights": "own",
-///     "materials": "converted",
-///     "exposure": 1.0,
-///     "views": [{ "id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera }],
-///     "instances": [{
-///         "id": "wall", "index": 1, "name": "wall", "role": { "type": "other" }, "category": null,
-///         "super_category": null, "triangles": 2, "atlas": null,
-///     }],
-///     "parts": [],
-///     "part_sets": [],
-///     "findings": [],
-/// }))?;
-/// let geometry = SceneGeometry {
-///     scene: &scene,
-///     view: &scene.views[0],
-///     folder: SceneFolder::of("dataset".as_ref(), &scene.id),
-///     world,
-///     valid: Picture::filled(8, 8, true),
-///     instances: Picture::filled(8, 8, 1),
-/// };
-///
-/// // Estimate: red everywhere.
-/// let red = LinearRgb([0.8, 0.1, 0.1]);
-/// let estimate = Estimate { base_color: Some(Picture::filled(8, 8, red)), ..Default::default() };
-///
-/// let texels = lift(&geometry, &SeenPixels::new(&geometry, (8, 8)), &estimate, 0, 4).texels;
-/// assert_eq!(texels.get(0, 2), Texel::Seen([0.8, 0.1, 0.1, 0.0, 0.0]));
-/// assert_eq!(texels.get(3, 2), Texel::Unseen);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn lift(
     geometry: &SceneGeometry<'_>,
     seen: &SeenPixels,

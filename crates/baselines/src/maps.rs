@@ -33,11 +33,7 @@ pub struct Maps {
 impl Maps {
     /// The maps of an atlas, with filled gutters. Maps that are not given have no file.
     pub fn of_atlas(known: &PartialAtlas, given: GivenMaps) -> Self {
-        let picture = known.texels.map(|texel| match texel {
-            Texel::Seen(values) => values,
-            Texel::Unused | Texel::Unseen => DEFAULT,
-        });
-        let mut maps = Self::of_values(&picture, given);
+        let mut maps = Self::of_values(&known.texels.map(|texel| texel.seen().unwrap_or(DEFAULT)), given);
         if let Some(map) = &mut maps.base_color {
             known.atlas.fill_gutters(map);
         }

@@ -17,7 +17,7 @@ use crate::estimate::{Estimate, Values};
 use crate::estimate_source::EstimateSource;
 use crate::fill::{FillRule, SeenCloud, fill};
 use crate::geometry::{SceneGeometry, SeenPixels, SeenPoint};
-use crate::lift::{PartialAtlas, Texel, lift};
+use crate::lift::{PartialAtlas, lift};
 use crate::maps::{Maps, Medians};
 use crate::submission::{self, Method};
 
@@ -132,7 +132,7 @@ pub fn lift_scene(
     let all = options.any_instance.then(|| SeenCloud::new(options.rule, points.iter().copied()));
     let lifted = |instance: usize, size: usize| {
         let mut whole = lift(geometry, seen, estimate, instance, size);
-        let is_seen = whole.texels.pixels().iter().map(|texel| matches!(texel, Texel::Seen(_))).collect();
+        let is_seen = whole.texels.pixels().iter().map(|texel| texel.seen().is_some()).collect();
         let mesh = geometry.mesh(instance);
         let filled = match &all {
             Some(all) => fill(all, &mut whole, mesh),

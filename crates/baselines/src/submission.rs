@@ -1,5 +1,4 @@
-//! Writes a submission, complete or not at all; and `gt`, the ceiling: the ground truth baked to the atlases, as a
-//! submission.
+//! Writes a submission, complete or not at all.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,8 +6,7 @@ use std::path::Path;
 use mateval_dataset::dataset::{Instance, SceneFile};
 use mateval_dataset::layout::is_rendered;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::submission::StoredEncoding;
-use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
+use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, StoredEncoding, SubmissionFile, scene_folder};
 use mateval_dataset::{Progress, Report, json};
 use mateval_files::FileError;
 use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
@@ -33,6 +31,16 @@ impl Method {
     }
 }
 
+/// A baseline that needs a dataset and no options.
+pub struct Baseline {
+    /// The word of the command line.
+    pub name: &'static str,
+    /// A line for the command's help.
+    pub about: &'static str,
+    /// Writes the submission to a folder, or, if told so, over an earlier one; returns the number of instances.
+    pub write: fn(&Dataset, &Path, bool) -> Result<usize, BaselineError>,
+}
+
 /// Writes a submission to `out` and returns the number of instances. `write_instance` is called for every instance that
 /// has an atlas, with the folder for its maps. `force` replaces an earlier submission.
 pub fn write(
@@ -40,10 +48,9 @@ pub fn write(
     out: &Path,
     force: bool,
     method: &Method,
-    progress: Progress<'_>,
     write_instance: impl Fn(&SceneFile, &Instance, &Path) -> Result<(), BaselineError>,
 ) -> Result<usize, BaselineError> {
-    write_scenes(dataset, out, force, method, progress, |scene, folder| {
+    write_scenes(dataset, out, force, method, &|_| (), |scene, folder| {
         let mut instances = 0;
         for instance in scene.instances.iter().filter(|instance| instance.atlas.is_some()) {
             let folder = folder.join(instance.id.as_str());
@@ -55,7 +62,7 @@ pub fn write(
     })
 }
 
-/// Like [`write()`], scene by scene: `write_scene` receives the folder for its instances' folders and returns the
+/// Writes a submission scene by scene: `write_scene` receives the folder for its instances' folders and returns the
 /// number of instances that it wrote.
 pub fn write_scenes(
     dataset: &Dataset,
@@ -99,43 +106,24 @@ pub fn write_scenes(
 /// `force` does not allow replacing, or that is no submission.
 pub fn check_out(dataset: &Dataset, out: &Path, force: bool) -> Result<(), BaselineError> {
     check_outside(dataset, out)?;
-    check_place(out, force)
+    check_free(out, force, "--out")?;
+    if out.exists() && !out.join(SUBMISSION).exists() {
+        let why = "exists and holds no submission.json, so it is not replaced; choose another --out";
+        return Err(BaselineError::unusable(out, why));
+    }
+    Ok(())
 }
 
 /// Fails where files for another project would replace something or lie in the dataset.
 pub(crate) fn check_new_place(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
     check_outside(dataset, out)?;
-    if out.exists() { Err(BaselineError::InTheWay(out.to_owned())) } else { Ok(()) }
+    match out.exists() {
+        true => Err(BaselineError::unusable(out, "already exists; choose another --out")),
+        false => Ok(()),
+    }
 }
 
-/// Fails where `out` lies in the dataset's folder, which must hold no other files.
 fn check_outside(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
-    if is_inside(out, &dataset.root) { Err(BaselineError::InDataset(out.to_owned())) } else { Ok(()) }
-}
-
-fn check_place(out: &Path, force: bool) -> Result<(), BaselineError> {
-    check_free(out, force, "--out")?;
-    if out.exists() && !out.join(SUBMISSION).exists() {
-        return Err(BaselineError::NotASubmission(out.to_owned()));
-    }
-    Ok(())
-}
-
-/// Copies the baked maps of every instance and returns the number of instances.
-pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
-    // A public tree is refused before anything is written.
-    for scene in dataset.scenes.iter().filter(|scene| !dataset.folder(&scene.id).truth().exists()) {
-        dataset.check_files(&scene.id, |path| path.starts_with("ground_truth/materials/"))?;
-    }
-    let method = Method::new("gt", "the true materials baked to the dataset's own atlases");
-    write(dataset, out, force, &method, &|_| (), |scene, instance, folder| {
-        let truth = dataset.folder(&scene.id).truth_material(&instance.id);
-        for map in Map::ALL {
-            let name = Path::new(map.stem()).with_extension("png");
-            let (from, to) = (truth.join(&name), folder.join(&name));
-            let copied = std::fs::copy(&from, &to);
-            copied.map_err(FileError::io("copy", from))?;
-        }
-        Ok(())
-    })
+    let why = "lies in the dataset, which must hold nothing else; choose another --out";
+    if is_inside(out, &dataset.root) { Err(BaselineError::unusable(out, why)) } else { Ok(()) }
 }

@@ -108,7 +108,7 @@ impl ExportPlaces {
 pub struct EstimateArgs {
     /// Estimate of base colour, roughness and metallic in the input view: `gt` (the ground truth), `input` (the input
     /// picture as base colour), `delight` (the input picture without its light), or a folder of a method's pictures
-    /// [default: gt for nn and texgen-export, input for median and median-part, delight for procedural].
+    /// [default: gt for nn and texgen-export, input for median, delight for procedural].
     #[arg(long, value_name = "gt|input|delight|FOLDER")]
     estimate: Option<PathBuf>,
     /// Names and encodings of the folder's files: colorful-shading, crefnet, delight, diffusion-renderer,

@@ -5,17 +5,17 @@ mod import;
 
 use std::num::NonZero;
 use std::path::PathBuf;
-use std::str::FromStr;
 
-use anyhow::{Context as _, bail};
-use clap::ValueEnum;
-use mateval_baselines::delight::relight::{self, Dimmed, RelightOptions};
+use anyhow::bail;
+use clap::{ArgMatches, Args as _, FromArgMatches, Subcommand, ValueEnum};
 use mateval_baselines::delight::{self, CandidateLights, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::fill::FillRule;
+use mateval_baselines::median::{self, MedianOf};
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, FitMode, ProceduralOptions, report_folder};
-use mateval_baselines::{bridges, homogeneous, submission};
+use mateval_baselines::submission::Baseline;
+use mateval_baselines::{BASELINES, bridges};
 use mateval_dataset::PartSetId;
 
 use crate::arguments::{EstimateArgs, ExportPlaces, Places};
@@ -24,23 +24,17 @@ use crate::terminal::{Outcome, counted, print, with_progress};
 /// Subcommands of `baseline`, one per method.
 #[derive(clap::Subcommand)]
 pub enum Command {
-    /// Ceiling: the true materials, baked to the dataset's own atlases.
-    Gt(Places),
-    /// Floor: base colour 0.5 (linear) everywhere.
-    Grey(Places),
+    #[command(flatten)]
+    WithoutOptions(WithoutOptions),
     /// Lifts an estimate of the input view to the atlases and fills unseen texels from their nearest seen points.
     Nn(NnArgs),
-    /// One colour per instance: the median of an estimate inside the instance's mask (IM2CAD).
+    /// One colour per instance, or per part: the median of an estimate inside its mask (IM2CAD).
     Median(MedianArgs),
-    /// One colour per part: the median of an estimate inside the part's mask.
-    MedianPart(MedianPartArgs),
     /// A procedural graph per part, fitted to an estimate: patterns continue where the input view shows nothing.
     Procedural(ProceduralArgs),
     /// Takes the light out of every photo: base colour from photo and geometry alone, as pictures that other baselines
     /// accept as an estimate.
     Delight(DelightArgs),
-    /// Lights the rooms of de-lit photos anew: a page with a slider for each of the strongest lights.
-    Relight(RelightArgs),
     /// Compares a method's pictures with the truth and reports which encoding their numbers fit; exit code 1 if it is
     /// not the adapter's.
     Encoding(encoding::EncodingArgs),
@@ -84,42 +78,66 @@ pub struct MedianArgs {
     places: Places,
     #[command(flatten)]
     estimate: EstimateArgs,
+    /// One colour per part.
+    #[arg(long)]
+    parts: bool,
+    /// The part set, such as `partfield` [default: the parts of the source].
+    #[arg(long, requires = "parts")]
+    part_set: Option<PartSetId>,
 }
 
-#[derive(clap::Args)]
-pub struct MedianPartArgs {
-    #[command(flatten)]
+/// One of the [`BASELINES`], with its only arguments.
+pub struct WithoutOptions {
+    baseline: Baseline,
     places: Places,
-    #[command(flatten)]
-    estimate: EstimateArgs,
-    /// The part set, such as `partfield` [default: the parts of the source].
-    #[arg(long)]
-    part_set: Option<PartSetId>,
+}
+
+impl Subcommand for WithoutOptions {
+    fn augment_subcommands(command: clap::Command) -> clap::Command {
+        command.subcommands(
+            BASELINES.map(|baseline| Places::augment_args(clap::Command::new(baseline.name)).about(baseline.about)),
+        )
+    }
+
+    fn augment_subcommands_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        BASELINES.iter().any(|baseline| baseline.name == name)
+    }
+}
+
+impl FromArgMatches for WithoutOptions {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let named = |(name, matches)| Some((BASELINES.into_iter().find(|baseline| baseline.name == name)?, matches));
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (baseline, matches) = matches.subcommand().and_then(named).ok_or_else(missing)?;
+        Ok(Self { baseline, places: Places::from_arg_matches(matches)? })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Gt(places) => places.done(submission::write_truth(&places.open()?, &places.out, places.force)?),
-        Command::Grey(places) => places.done(homogeneous::write_grey(&places.open()?, &places.out, places.force)?),
+        Command::WithoutOptions(WithoutOptions { baseline, places }) => {
+            places.done((baseline.write)(&places.open()?, &places.out, places.force)?)
+        }
         Command::Nn(args) => nearest_neighbours(args),
         Command::Median(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
             let dataset = places.open_for(&source)?;
+            let of = if args.parts { MedianOf::Parts(args.part_set.as_ref()) } else { MedianOf::Instances };
             places.done(with_progress(|progress| {
-                homogeneous::write_by_instance(&dataset, &places.out, places.force, &source, progress)
-            })?)
-        }
-        Command::MedianPart(args) => {
-            let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
-            let set = args.part_set.as_ref();
-            let dataset = places.open_for(&source)?;
-            places.done(with_progress(|progress| {
-                homogeneous::write_by_part(&dataset, &places.out, places.force, &source, set, progress)
+                median::write(&dataset, &places.out, places.force, &source, of, progress)
             })?)
         }
         Command::Procedural(args) => args.run(),
         Command::Delight(args) => args.run(),
-        Command::Relight(args) => args.run(),
         Command::Encoding(args) => args.run(),
         Command::Import(args) => args.run(),
         Command::TexgenExport(args) => args.run(),
@@ -246,52 +264,6 @@ impl ProceduralArgs {
 }
 
 #[derive(clap::Args)]
-pub struct RelightArgs {
-    /// The output of `mateval baseline delight`.
-    pictures: PathBuf,
-    #[command(flatten)]
-    places: ExportPlaces,
-    /// Multiply the radiance of a light of `lights.json`, such as lamp=0 or world=2; may be repeated. Other lights stay
-    /// as they were fitted.
-    #[arg(long = "light", value_name = "NAME=FACTOR")]
-    lights: Vec<LightFactor>,
-    /// Paths per pixel.
-    #[arg(long, default_value_t = RelightOptions::default().samples, value_parser = clap::value_parser!(u32).range(2..=65_536))]
-    samples: u32,
-}
-
-/// A light and the factor of its radiance.
-#[derive(Clone)]
-struct LightFactor(Dimmed);
-
-impl FromStr for LightFactor {
-    type Err = anyhow::Error;
-
-    fn from_str(text: &str) -> anyhow::Result<Self> {
-        let (name, factor) = text.rsplit_once('=').context("expected NAME=FACTOR")?;
-        let factor: f64 = factor.parse().with_context(|| format!("'{factor}' is not a number"))?;
-        if !(0.0..=1e6).contains(&factor) {
-            bail!("factor {factor}: expected 0 to 1e6");
-        }
-        Ok(Self(Dimmed { name: name.to_owned(), factor }))
-    }
-}
-
-impl RelightArgs {
-    /// Writes the pictures and the page.
-    pub fn run(&self) -> anyhow::Result<Outcome> {
-        let dataset = self.places.open()?;
-        let dimmed = self.lights.iter().map(|LightFactor(dimmed)| dimmed.clone()).collect();
-        let options = RelightOptions { dimmed, samples: self.samples };
-        let out = &self.places.out;
-        let count = with_progress(|progress| relight::write(&dataset, &self.pictures, out, &options, progress))?;
-        let scenes = counted(count, "scene");
-        print(&format!("'{}': {scenes}; open '{}'\n", out.display(), out.join("index.html").display()))?;
-        Ok(Outcome::Good)
-    }
-}
-
-#[derive(clap::Args)]
 pub struct TexgenExportArgs {
     #[command(flatten)]
     places: ExportPlaces,
@@ -327,11 +299,11 @@ impl TexgenImportArgs {
         }
         let (places, source) = (&self.places, self.estimate.source(EstimateSource::Truth)?);
         let dataset = places.open()?;
-        let found = with_progress(|progress| {
+        let (instances, textured) = with_progress(|progress| {
             bridges::import_texgen(&dataset, &self.results, &places.out, places.force, &source, progress)
         })?;
-        print(&format!("{}: {} textures found\n", self.results.display(), found.textured))?;
-        places.done(found.instances)
+        print(&format!("{}: {textured} textures found\n", self.results.display()))?;
+        places.done(instances)
     }
 }
 

@@ -10,11 +10,12 @@ use std::time::Instant;
 
 use anyhow::{Context as _, bail};
 use mateval_baselines::adapter::Adapter;
+use mateval_baselines::bounds;
 use mateval_baselines::delight::{self, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
+use mateval_baselines::median::{self, MedianOf};
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
-use mateval_baselines::{homogeneous, submission};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, Severity, json};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
@@ -341,13 +342,13 @@ fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> an
             continue;
         }
         match baseline {
-            DemoBaseline::Gt => submission::write_truth(dataset, &out, false)?,
-            DemoBaseline::Grey => homogeneous::write_grey(dataset, &out, false)?,
+            DemoBaseline::Gt => bounds::write_truth(dataset, &out, false)?,
+            DemoBaseline::Grey => bounds::write_grey(dataset, &out, false)?,
             DemoBaseline::Nn => with_progress(|progress| {
                 nn::write(dataset, &out, false, &EstimateSource::Truth, &NnOptions::default(), progress)
             })?,
             DemoBaseline::Median => with_progress(|progress| {
-                homogeneous::write_by_instance(dataset, &out, false, &EstimateSource::Input, progress)
+                median::write(dataset, &out, false, &EstimateSource::Input, MedianOf::Instances, progress)
             })?,
             DemoBaseline::Procedural | DemoBaseline::ProceduralKeepSeen => {
                 if !places.delit.exists() {

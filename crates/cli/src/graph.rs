@@ -9,7 +9,6 @@ use mateval_procedural::error::Finding;
 use mateval_procedural::evaluator::{Pixel, Square, render};
 use mateval_procedural::graph::Parameter;
 use mateval_procedural::library::{LIBRARY, entry};
-use mateval_procedural::mtlx::Limits;
 use mateval_procedural::mtlx::read_file;
 use mateval_procedural::value::Value;
 use mateval_procedural::{Graph, ProceduralError, Program, Settings};
@@ -152,7 +151,7 @@ impl CheckArgs {
 
 /// A file that is refused is a result of the check; one that cannot be read is a failure to check.
 fn findings(file: &Path) -> anyhow::Result<Vec<Finding>> {
-    match read_file(file, &Limits::default()) {
+    match read_file(file) {
         Ok(_) => Ok(Vec::new()),
         Err(ProceduralError::Invalid { findings, .. }) => Ok(findings),
         Err(other) => Err(other.into()),
@@ -215,7 +214,7 @@ impl RenderArgs {
 /// Reads a `.mtlx` file, or takes the built-in graph of this name. Prints all findings about a file that is refused.
 fn open_graph(word: &Path) -> anyhow::Result<Graph> {
     if word.extension().is_some_and(|extension| extension == "mtlx") {
-        let read = read_file(word, &Limits::default());
+        let read = read_file(word);
         if let Err(ProceduralError::Invalid { name, findings }) = &read {
             findings.iter().for_each(|finding| say(&format!("{name}: {finding}")));
         }

@@ -26,12 +26,6 @@ use crate::ridge_fit::{back_substitute, cholesky, dot};
 /// How light and colour are separated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointFitRules {
-    /// Side of the squares of pixels whose averages are compared.
-    pub pool: usize,
-    /// The residual s, in powers of e, at which a square begins to count as an outlier.
-    pub softness: f64,
-    /// The number of squares that a photo counts as: more pixels are no more evidence about what the model leaves out.
-    pub evidence: f64,
     /// The weight k_a of the usual colour.
     pub color_prior: f64,
     /// The usual base colour a_0, linear.
@@ -40,30 +34,26 @@ pub struct JointFitRules {
     pub light_prior: f64,
     /// The weight k_x of lights of one colour.
     pub light_color_prior: f64,
-    /// The weight of the radiance that the photo shows of a light.
-    pub shown_prior: f64,
-    /// The largest number of steps.
-    pub steps: u32,
-    /// The least light I - G of a square, as a share of I.
-    pub least_diffuse: f64,
 }
 
 impl Default for JointFitRules {
     fn default() -> Self {
-        Self {
-            pool: 8,
-            softness: 0.2,
-            evidence: 400.0,
-            color_prior: 0.01,
-            usual_color: 0.45,
-            light_prior: 0.1,
-            light_color_prior: 10.0,
-            shown_prior: 50.0,
-            steps: 40,
-            least_diffuse: 0.05,
-        }
+        Self { color_prior: 0.01, usual_color: 0.45, light_prior: 0.1, light_color_prior: 10.0 }
     }
 }
+
+/// Side of the squares of pixels whose averages are compared.
+const POOL: usize = 8;
+/// The residual s, in powers of e, at which a square begins to count as an outlier.
+const SOFTNESS: f64 = 0.2;
+/// The number of squares that a photo counts as: more pixels are no more evidence about what the model leaves out.
+const EVIDENCE: f64 = 400.0;
+/// The weight k_s of the radiance that the photo shows of a light.
+const SHOWN_PRIOR: f64 = 50.0;
+/// The largest number of steps.
+const STEPS: u32 = 40;
+/// The least light I - G of a square, as a share of I.
+const LEAST_DIFFUSE: f64 = 0.05;
 
 /// What is fitted to. All pictures have one size.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +83,7 @@ pub struct JointFit {
 /// ignored; if no square has light, no part has a colour.
 pub fn fit_jointly(rules: &JointFitRules, target: &JointTarget<'_>) -> JointFit {
     let lights = target.light.first().map_or(0, |light| light.diffuse.pictures().len() - 1);
-    let (parts, all) = rows(rules, target, |pixel| pixel.0.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0);
+    let (parts, all) = rows(target, |pixel| pixel.0.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0);
     // The logarithm of what is shown, of a channel or of their mean.
     let shown = |value: &dyn Fn([f64; 3]) -> f64| -> Vec<Option<f64>> {
         // A black background may be a sky that the camera does not see; a black channel of a lamp is one.
@@ -107,7 +97,7 @@ pub fn fit_jointly(rules: &JointFitRules, target: &JointTarget<'_>) -> JointFit 
     let light_prior = rules.light_prior;
     let grey = Problem { rules, centre, light_prior, shown: shown_grey, parts: parts.len(), rows: all }.solve();
     let fits = [0, 1, 2].map(|channel| {
-        let (parts, rows) = rows(rules, target, |pixel| f64::from(pixel.0[channel]));
+        let (parts, rows) = rows(target, |pixel| f64::from(pixel.0[channel]));
         let (centre, light_prior) = (grey[..lights].to_vec(), rules.light_color_prior);
         let shown = shown(&|rgb| rgb[channel]);
         let problem = Problem { rules, centre, light_prior, shown, parts: parts.len(), rows };
@@ -128,7 +118,7 @@ pub fn fit_jointly(rules: &JointFitRules, target: &JointTarget<'_>) -> JointFit 
 struct Row {
     /// The place of the part among those that occur.
     part: usize,
-    /// The share of all valid pixels that they are, times [`JointFitRules::evidence`].
+    /// The share of all valid pixels that they are, times [`EVIDENCE`].
     weight: f64,
     /// Means of the photo, and of the pictures of each light and of the photo's own light.
     photo: f64,
@@ -137,13 +127,12 @@ struct Row {
 }
 
 /// The parts in order, and the rows.
-fn rows(rules: &JointFitRules, target: &JointTarget<'_>, value: impl Fn(&LinearRgb) -> f64) -> (Vec<u16>, Vec<Row>) {
+fn rows(target: &JointTarget<'_>, value: impl Fn(&LinearRgb) -> f64) -> (Vec<u16>, Vec<Row>) {
     let (width, height) = (target.photo.width(), target.photo.height());
-    let pool = rules.pool.max(1);
-    let columns = width.div_ceil(pool);
+    let columns = width.div_ceil(POOL);
     let mut pixels: BTreeMap<(usize, u16), Vec<usize>> = BTreeMap::new();
     for k in (0..width * height).filter(|&k| target.valid.pixels()[k]) {
-        let square = k / width / pool * columns + k % width / pool;
+        let square = k / width / POOL * columns + k % width / POOL;
         pixels.entry((square, target.parts.pixels()[k])).or_default().push(k);
     }
     let mean = |picture: &Picture<LinearRgb>, of: &[usize]| {
@@ -168,7 +157,7 @@ fn rows(rules: &JointFitRules, target: &JointTarget<'_>, value: impl Fn(&LinearR
     parts.dedup();
     let row = |(part, photo, count, diffuse, gloss): (u16, f64, usize, Vec<f64>, Vec<f64>)| Row {
         part: parts.partition_point(|other| *other < part),
-        weight: count as f64 / valid as f64 * rules.evidence,
+        weight: count as f64 / valid as f64 * EVIDENCE,
         photo,
         diffuse,
         gloss,
@@ -201,7 +190,7 @@ impl Problem<'_> {
         let mut at = self.start();
         let mut objective = self.objective(&at);
         let mut damping = 1e-3;
-        for _ in 0..self.rules.steps {
+        for _ in 0..STEPS {
             let equations = self.normal_equations(&at);
             let mut gained = 0.0;
             while damping < MOST_DAMPING {
@@ -256,7 +245,7 @@ impl Problem<'_> {
     /// The residual of a row, and its derivatives by the logarithms of radiances.
     fn residual(&self, row: &Row, at: &[f64], radiances: &[f64], slopes: Option<&mut Vec<f64>>) -> f64 {
         let sum = |values: &[f64]| dot(&values[..self.centre.len()], radiances) + values[self.centre.len()];
-        let least = self.rules.least_diffuse * row.photo;
+        let least = LEAST_DIFFUSE * row.photo;
         let shown = row.photo - sum(&row.gloss);
         let (light, diffuse) = (sum(&row.diffuse).max(f64::MIN_POSITIVE), shown.max(least));
         if let Some(slopes) = slopes {
@@ -270,10 +259,9 @@ impl Problem<'_> {
 
     fn objective(&self, at: &[f64]) -> f64 {
         let radiances = self.radiances(at);
-        let soft = self.rules.softness;
         let misfit = self.rows.iter().map(|row| {
-            let ratio = self.residual(row, at, &radiances, None) / soft;
-            row.weight * 2.0 * soft * soft * ((1.0 + ratio * ratio).sqrt() - 1.0)
+            let ratio = self.residual(row, at, &radiances, None) / SOFTNESS;
+            row.weight * 2.0 * SOFTNESS * SOFTNESS * ((1.0 + ratio * ratio).sqrt() - 1.0)
         });
         let usual = libm::log(self.rules.usual_color);
         let colors = at[self.centre.len()..].iter().map(|c| (c - usual) * (c - usual)).sum::<f64>();
@@ -290,7 +278,7 @@ impl Problem<'_> {
         let mut slopes = Vec::new();
         for row in &self.rows {
             let residual = self.residual(row, at, &radiances, Some(&mut slopes));
-            let ratio = residual / self.rules.softness;
+            let ratio = residual / SOFTNESS;
             let weight = row.weight / (1.0 + ratio * ratio).sqrt();
             for i in 0..lights {
                 let scaled = weight * slopes[i];
@@ -326,7 +314,7 @@ impl Problem<'_> {
 
     /// The weight of a light's deviation.
     fn prior(&self, light: usize) -> f64 {
-        if self.shown[light].is_some() { self.rules.shown_prior } else { self.light_prior }
+        if self.shown[light].is_some() { SHOWN_PRIOR } else { self.light_prior }
     }
 
     /// What the priors of radiances see: how far they are from what is shown, or from x_0 up to a common factor.

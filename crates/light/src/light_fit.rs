@@ -75,7 +75,10 @@ pub fn fit_lights(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) 
     let fits = [0, 1, 2].map(|channel| ChannelFit::new(rules, basis, target, channel));
     let numbers = fits.iter().flat_map(|fit| fit.solution.multiples.iter().chain([&fit.gap, &fit.start]));
     if !numbers.into_iter().all(|v| v.is_finite()) {
-        return Err(LightError::NoSolution { lights, squares: squares[0] * squares[1] });
+        let squares = squares[0] * squares[1];
+        return Err(LightError(format!(
+            "no finite weights of {lights} lights found for {squares} averaged squares; please report this scene"
+        )));
     }
     let weight = |light: usize| [0, 1, 2].map(|channel| fits[channel].solution.multiples[light] * fits[channel].start);
     Ok(LightFit {
@@ -116,31 +119,32 @@ fn check(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result
     let &FitTarget { photo: target, mask, exposure } = target;
     for (what, value) in [("ridge", rules.ridge), ("exposure", exposure)] {
         if !(value.is_finite() && value > 0.0) {
-            return Err(LightError::NotPositive { what, value });
+            return Err(LightError(format!("the {what} is {value}, expected a finite number above 0")));
         }
     }
-    let photo = [target.width(), target.height()];
+    let other_size = |what: &str, [width, height]: [usize; 2]| {
+        let photo = format!("the photo {}x{}", target.width(), target.height());
+        Err(LightError(format!("the {what} has {width}x{height} pixels, {photo}")))
+    };
     if let Some(mask) = mask.filter(|mask| !mask.same_size(target)) {
-        return Err(LightError::MaskSize { mask: [mask.width(), mask.height()], photo });
+        return other_size("mask", [mask.width(), mask.height()]);
     }
-    if let Some((at, value)) = first_pixel(target, |v| !v.is_finite()) {
-        return Err(LightError::PhotoNotFinite { at, value });
-    }
+    check_finite(target, "the photo")?;
     for (group, picture) in basis.pictures().iter().enumerate() {
         if !picture.same_size(target) {
-            return Err(LightError::BasisSize { basis: [picture.width(), picture.height()], photo });
+            return other_size("basis", [picture.width(), picture.height()]);
         }
-        if let Some((at, value)) = first_pixel(picture, |v| !v.is_finite()) {
-            return Err(LightError::BasisPicture { group, at, value });
-        }
+        check_finite(picture, &format!("light group {group}"))?;
     }
     Ok(())
 }
 
-/// Position and value of the first pixel with a channel that is `wrong`.
-fn first_pixel(picture: &Picture<LinearRgb>, wrong: impl Fn(f32) -> bool) -> Option<([usize; 2], [f32; 3])> {
-    let at = picture.pixels().iter().position(|pixel| pixel.0.iter().any(|v| wrong(*v)))?;
-    Some(([at % picture.width(), at / picture.width()], picture.pixels()[at].0))
+fn check_finite(picture: &Picture<LinearRgb>, what: &str) -> Result<(), LightError> {
+    let Some(at) = picture.pixels().iter().position(|pixel| pixel.0.iter().any(|v| !v.is_finite())) else {
+        return Ok(());
+    };
+    let (x, y, value) = (at % picture.width(), at / picture.width(), picture.pixels()[at].0);
+    Err(LightError(format!("pixel ({x}, {y}) of {what} is {value:?}, expected finite numbers")))
 }
 
 /// The fits to two bases that come from independent samples.
@@ -223,7 +227,7 @@ pub fn fit_two_streams(
 ) -> Result<TwoStreamFit, LightError> {
     let groups = bases.map(|basis| basis.pictures().len());
     if groups[0] != groups[1] {
-        return Err(LightError::StreamLights { groups });
+        return Err(LightError(format!("the two bases have {} and {} light groups", groups[0], groups[1])));
     }
     Ok(TwoStreamFit { streams: [fit_lights(rules, bases[0], target)?, fit_lights(rules, bases[1], target)?] })
 }
@@ -308,64 +312,10 @@ fn averages(
     sums
 }
 
-/// Why lights could not be fitted to a photo.
+/// Why lights could not be fitted to a photo: what was expected and what was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum LightError {
-    /// Mask and photo differ in size.
-    #[error("cannot fit lights: the mask has {}x{} pixels, the photo {}x{}", mask[0], mask[1], photo[0], photo[1])]
-    MaskSize {
-        /// Width and height of the mask.
-        mask: [usize; 2],
-        /// Width and height of the photo.
-        photo: [usize; 2],
-    },
-    /// A light's picture and the photo differ in size.
-    #[error("cannot fit lights: the basis has {}x{} pixels, the photo {}x{}", basis[0], basis[1], photo[0], photo[1])]
-    BasisSize {
-        /// Width and height of the basis.
-        basis: [usize; 2],
-        /// Width and height of the photo.
-        photo: [usize; 2],
-    },
-    /// The photo holds an infinity or NaN.
-    #[error("cannot fit lights: pixel ({}, {}) of the photo is {value:?}, expected finite numbers", at[0], at[1])]
-    PhotoNotFinite {
-        /// Column and row of the first such pixel.
-        at: [usize; 2],
-        value: [f32; 3],
-    },
-    /// A light's picture holds an infinity or NaN.
-    #[error(
-        "cannot fit lights: pixel ({}, {}) of light group {group} is {value:?}, expected finite numbers",
-        at[0], at[1]
-    )]
-    BasisPicture {
-        /// The group's place in the basis.
-        group: usize,
-        /// Column and row of the first such pixel.
-        at: [usize; 2],
-        value: [f32; 3],
-    },
-    /// Two streams of samples show different lights.
-    #[error("cannot fit lights: the two bases have {} and {} light groups", groups[0], groups[1])]
-    StreamLights {
-        /// Number of light groups of each basis.
-        groups: [usize; 2],
-    },
-    /// A number that must be above 0 is not.
-    #[error("cannot fit lights: the {what} is {value}, expected a finite number above 0")]
-    NotPositive { what: &'static str, value: f64 },
-    /// The solver found no finite weights.
-    #[error(
-        "cannot fit lights: no finite weights of {lights} lights found for {squares} averaged squares; please report this \
-         scene"
-    )]
-    NoSolution {
-        lights: usize,
-        /// Number of averaged squares of pixels.
-        squares: usize,
-    },
-}
+#[error("cannot fit lights: {0}")]
+pub struct LightError(String);
 
 /// Fits of three lights to photos that are sums of them.
 #[cfg(test)]

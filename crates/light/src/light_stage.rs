@@ -93,13 +93,13 @@ pub fn lights(rules: &StageRules, world: &World, architecture: &[usize], cameras
     let room = LitRoom { rules, world, centre: cameras[0].position() };
     let mut lights = room.ceiling_lights(cameras);
     lights.push(NamedLight { name: "camera".to_owned(), light: camera_light(rules, &cameras[0]) });
-    let walls = room.walls(architecture).into_iter();
-    let unseen = walls.filter(|wall| room.is_visible(wall) && !room.is_in_a_view(wall, cameras));
-    lights.extend(
-        unseen
-            .enumerate()
-            .map(|(number, wall)| NamedLight { name: format!("wall_{}", number + 1), light: room.wall_light(&wall) }),
-    );
+    let meshes = architecture.iter().map(|&surface| &world.scene().surfaces[surface].mesh);
+    let triangles = meshes.flat_map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle)));
+    let walls = walls(rules, triangles.map(|corners| corners.map(|corner| corner.as_dvec3())));
+    let is_visible = |wall: &Rectangle| room.places(wall).any(|place| room.sees(place));
+    let unseen = walls.into_iter().filter(|wall| is_visible(wall) && !room.is_in_a_view(wall, cameras));
+    let named = |(wall, number)| NamedLight { name: format!("wall_{number}"), light: room.wall_light(&wall) };
+    lights.extend(unseen.zip(1..).map(named));
     lights
 }
 
@@ -172,24 +172,12 @@ impl LitRoom<'_> {
         (tilt < most * most).then(|| f64::from(hit.position.y))
     }
 
-    /// The walls of the architecture.
-    fn walls(&self, architecture: &[usize]) -> Vec<Rectangle> {
-        let meshes = architecture.iter().map(|&surface| &self.world.scene().surfaces[surface].mesh);
-        let triangles = meshes.flat_map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle)));
-        walls(self.rules, triangles.map(|corners| corners.map(|corner| corner.as_dvec3())))
-    }
-
     fn wall_light(&self, wall: &Rectangle) -> StageLight {
         let StageRules { wall_share, wall_gap_m, .. } = *self.rules;
         let normal = wall.normal_towards(self.centre);
         let margin = (1.0 - wall_share) / 2.0;
         let corner = wall.corner + (wall.sides[0] + wall.sides[1]) * margin + normal * wall_gap_m;
         Rectangle { corner, sides: wall.sides.map(|side| side * wall_share) }.facing(normal)
-    }
-
-    /// Whether any place of the wall is visible from the centre, in any direction.
-    fn is_visible(&self, wall: &Rectangle) -> bool {
-        self.places(wall).any(|place| self.sees(place))
     }
 
     /// Whether any place of the wall is in the picture of a view.
@@ -405,8 +393,7 @@ fn frustum(camera: &Camera) -> [DVec3; 4] {
 mod tests {
     use std::sync::Arc;
 
-    use mateval_dataset::dataset::{FORMAT, Instance, SceneSource, TrueMaterials, View};
-    use mateval_dataset::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
+    use mateval_dataset::Intrinsics;
     use mateval_testkit::scenes::{WALLS, box_camera, box_quad, box_room};
 
     use super::*;
@@ -477,69 +464,18 @@ mod tests {
         assert_eq!(walls.iter().filter(|wall| normal(&wall.light).x.abs() > 0.99).count(), 2);
     }
 
-    /// The names of the lights in a room whose architecture is a piece of furniture or a wall that no view sees: a
-    /// screen behind the camera, of the given role and without a category.
-    fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
-        let screen = box_quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
-        let world = world(vec![screen]);
-        let wall = Role::Architecture { kind: "WallInner".to_owned() };
-        let roles = std::iter::repeat_n(&wall, 6).chain([role]);
-        let scene = SceneFile {
-            format: FORMAT.to_owned(),
-            id: SceneId::new("room").unwrap(),
-            source: SceneSource {
-                kind: SourceKind::Front3d,
-                house: "house".to_owned(),
-                states_roughness: false,
-                states_metallic: false,
-                shift_m: [0.0; 3],
-                files: Vec::new(),
-            },
-            lights: SceneLights::Stage,
-            materials: TrueMaterials::Converted,
-            exposure: 1.0,
-            photo: None,
-            views: vec![View {
-                id: ViewId::new("input").unwrap(),
-                x_deg: 0.0,
-                y_deg: 0.0,
-                camera: box_camera(),
-                wide: None,
-            }],
-            instances: roles.zip(1..).map(|(role, index)| instance(index, role)).collect(),
-            parts: Vec::new(),
-            part_sets: Vec::new(),
-            findings: Vec::new(),
-        };
-        scene_lights(&rules(), &scene, &world)
-    }
-
-    fn instance(index: u16, role: &Role) -> Instance {
-        Instance {
-            id: InstanceId::new(format!("i{index}")).unwrap(),
-            index: InstanceIndex(index.try_into().unwrap()),
-            name: String::new(),
-            role: role.clone(),
-            category: None,
-            super_category: None,
-            triangles: 2,
-            unstated: Vec::new(),
-            atlas: None,
-        }
-    }
-
-    /// Furniture without a category is no wall: it gets no light, and hides the wall behind it, which then gets none
-    /// either.
+    /// Furniture is no wall: it gets no light, and hides the wall behind it, which then gets none either.
     #[test]
     fn only_architecture_gets_wall_lights() {
-        for role in [Role::Furniture {}, Role::LightFixture {}, Role::Other {}] {
-            let walls = named(&lights_with_screen(&role), "wall");
-            let at_the_screen = |wall: &NamedLight| wall.light.mesh.positions.iter().any(|p| (p.z - 5.8).abs() < 0.01);
-            assert!(!walls.iter().any(at_the_screen), "{role:?}: {walls:?}");
-        }
+        let room = world(vec![box_quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0])]);
+        let depths = |architecture: &[usize]| -> Vec<f32> {
+            let lights = lights(&rules(), &room, architecture, &[box_camera()]);
+            named(&lights, "wall").iter().map(|wall| wall.light.mesh.positions[0].z).collect()
+        };
+        let is_at_the_screen = |z: &f32| (z - 5.8).abs() < 0.01;
+        assert!(!depths(&WALLS).iter().any(is_at_the_screen));
         // The twin: the same quad as architecture.
-        let walls = named(&lights_with_screen(&Role::Architecture { kind: "Other".to_owned() }), "wall");
-        assert!(walls.iter().any(|wall| (wall.light.mesh.positions[0].z - 5.799).abs() < 1e-4), "{walls:?}");
+        assert!(depths(&[2, 3, 4, 5, 6]).iter().any(is_at_the_screen));
     }
 
     /// Two triangles that make a rectangle in the plane x = `x`, from `low` to `high` in z and y.

@@ -19,6 +19,14 @@ pub struct Points {
     pub footprint: Lanes,
 }
 
+impl Points {
+    /// At most [`LANES`] places `[u, v, footprint]`.
+    pub(crate) fn of(batch: &[[f64; 3]]) -> Self {
+        let at = |axis: usize| std::array::from_fn(|lane| batch[lane.min(batch.len() - 1)][axis]);
+        Self { u: at(0), v: at(1), footprint: at(2) }
+    }
+}
+
 /// Evaluates a program. Results that are the same at all points are computed once, when the settings are set;
 /// derivatives that are known to be zero are not computed at all.
 pub struct Evaluator<'p> {
@@ -191,6 +199,17 @@ fn dependencies(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usiz
     all
 }
 
+/// The outputs at places `[u, v, footprint]`, all in metres.
+pub(crate) fn evaluate(program: &Program, settings: &Settings, places: &[[f64; 3]]) -> Vec<[f64; OUTPUTS]> {
+    let mut evaluator = Evaluator::new(program, settings, &[]);
+    let mut all = Vec::with_capacity(places.len());
+    for batch in places.chunks(LANES) {
+        evaluator.run(&Points::of(batch));
+        all.extend((0..batch.len()).map(|lane| evaluator.outputs(lane)));
+    }
+    all
+}
+
 /// The most pixels a side: a picture of them takes 0.7 GB.
 pub const MOST_PIXELS: usize = 4096;
 
@@ -215,61 +234,39 @@ impl Square {
     /// resolution is 1 to [`MOST_PIXELS`].
     pub fn new(size_metres: f64, resolution: usize) -> Result<Self, ProceduralError> {
         let fits = size_metres.is_finite() && size_metres > 0.0 && (1..=MOST_PIXELS).contains(&resolution);
-        let refused = ProceduralError::PictureSize { size_metres, resolution, most: MOST_PIXELS };
-        if fits { Ok(Self { size_metres, resolution }) } else { Err(refused) }
+        let found = format!("{size_metres} metres and {resolution} pixels");
+        let expected = format!("expected a size above 0 metres and 1 to {MOST_PIXELS} pixels a side, found {found}");
+        if fits { Ok(Self { size_metres, resolution }) } else { Err(ProceduralError::Unusable(expected)) }
     }
 
-    fn pixel_metres(&self) -> f64 {
-        self.size_metres / self.resolution as f64
-    }
-
-    /// The points of a row of pixels from column `first` on; beyond the row's end the last one is repeated.
-    fn points(&self, row: usize, first: usize) -> Points {
-        let pixel = self.pixel_metres();
-        let column = |lane: usize| (first + lane).min(self.resolution - 1);
+    /// The places of a row of pixels.
+    fn places(self, row: usize) -> Vec<[f64; 3]> {
+        let pixel = self.size_metres / self.resolution as f64;
         let v = ((self.resolution - 1 - row) as f64 + 0.5) * pixel;
-        let u = std::array::from_fn(|lane| (column(lane) as f64 + 0.5) * pixel);
-        Points { u, v: [v; LANES], footprint: [pixel; LANES] }
+        (0..self.resolution).map(|column| [(column as f64 + 0.5) * pixel, v, pixel]).collect()
     }
 }
 
 /// Evaluates a graph at every pixel, row by row from the top. The same on any number of threads. Fails where a value is
 /// not finite.
 pub fn render(program: &Program, settings: &Settings, square: Square) -> Result<Vec<Pixel>, ProceduralError> {
-    let prepare = || Evaluator::new(program, settings, &[]);
-    let black = Pixel { base_color: [0.0; 3], roughness: 0.0, metallic: 0.0 };
-    let mut pixels = vec![black; square.resolution * square.resolution];
-    let rows = pixels.par_chunks_mut(square.resolution).enumerate();
-    let rows = rows.map_init(prepare, |evaluator, (row, pixels)| fill(pixels, evaluator, program, square, row));
-    let rows: Vec<Result<(), ProceduralError>> = rows.collect();
+    let pixels = |row: usize| -> Result<Vec<Pixel>, ProceduralError> {
+        let places = square.places(row);
+        let outputs = evaluate(program, settings, &places);
+        places.iter().zip(outputs).map(|(place, outputs)| pixel(program, outputs, *place)).collect()
+    };
+    let rows: Vec<_> = (0..square.resolution).into_par_iter().map(pixels).collect();
     // The first row that fails, on any number of threads.
-    rows.into_iter().collect::<Result<(), _>>()?;
-    Ok(pixels)
+    Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// Evaluates a row of pixels.
-fn fill(
-    pixels: &mut [Pixel],
-    evaluator: &mut Evaluator,
-    program: &Program,
-    square: Square,
-    row: usize,
-) -> Result<(), ProceduralError> {
-    for (at, batch) in pixels.chunks_mut(LANES).enumerate() {
-        let points = square.points(row, at * LANES);
-        evaluator.run(&points);
-        for (lane, place) in batch.iter_mut().enumerate() {
-            *place = pixel(program, evaluator.outputs(lane), points.u[lane], points.v[lane])?;
-        }
-    }
-    Ok(())
-}
-
-fn pixel(program: &Program, outputs: [f64; OUTPUTS], u: f64, v: f64) -> Result<Pixel, ProceduralError> {
+fn pixel(program: &Program, outputs: [f64; OUTPUTS], [u, v, _]: [f64; 3]) -> Result<Pixel, ProceduralError> {
     const NAMES: [&str; OUTPUTS] = ["red", "green", "blue", "roughness", "metallic"];
     if let Some(at) = outputs.iter().position(|value| !value.is_finite()) {
-        let graph = program.name.clone();
-        return Err(ProceduralError::NotFinite { graph, output: NAMES[at], u, v, value: outputs[at] });
+        return Err(ProceduralError::Unusable(format!(
+            "'{}' is not finite at ({u}, {v}) metres: its {} is {}; choose other parameters",
+            program.name, NAMES[at], outputs[at]
+        )));
     }
     let [red, green, blue, roughness, metallic] = outputs;
     Ok(Pixel { base_color: [red, green, blue], roughness, metallic })

@@ -2,7 +2,7 @@
 
 use crate::error::ProceduralError;
 use crate::node::{Kind, Signature};
-use crate::value::{Type, Value, shortened};
+use crate::value::{Type, Value, shortened, words};
 
 /// The name of the parameter that an evaluator sets at every point to the extent of a pixel or texel in metres.
 pub const FOOTPRINT: &str = "footprint";
@@ -46,30 +46,19 @@ pub struct Node {
     pub inputs: Vec<Source>,
 }
 
-/// An output of a material.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Output {
-    /// Linear colour from 0 to 1.
-    BaseColor,
-    /// 0 to 1.
-    Roughness,
-    /// 0 to 1.
-    Metallic,
+words! {
+    /// An output of a material. Every graph has all of them, in the order of [`Graph::outputs`].
+    pub enum Output {
+        /// Linear colour from 0 to 1.
+        BaseColor = "base_color",
+        /// 0 to 1.
+        Roughness = "roughness",
+        /// 0 to 1.
+        Metallic = "metallic",
+    }
 }
 
 impl Output {
-    /// The outputs that every graph has, in the order of [`Graph::outputs`].
-    pub const ALL: [Self; 3] = [Self::BaseColor, Self::Roughness, Self::Metallic];
-
-    /// The name in `.mtlx` files.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::BaseColor => "base_color",
-            Self::Roughness => "roughness",
-            Self::Metallic => "metallic",
-        }
-    }
-
     pub fn kind(self) -> Type {
         match self {
             Self::BaseColor => Type::Color3,
@@ -174,34 +163,39 @@ impl Settings {
         named
     }
 
-    /// All numbers, to be changed without a check of their ranges.
-    pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
-        &mut self.0
-    }
-
     /// Sets a parameter from text, as in `0.2` or `0.8, 0.7, 0.6`. Fails where the parameter does not exist, or the
     /// text is no value of its type and range.
     pub fn set(&mut self, graph: &Graph, name: &str, text: &str) -> Result<(), ProceduralError> {
-        let Some(at) = graph.parameter(name) else { return Err(unknown(graph, name)) };
+        let Some(at) = graph.parameter(name) else {
+            let known: Vec<&str> = graph.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+            return Err(ProceduralError::Unusable(format!(
+                "'{}' has no parameter '{}'; expected one of: {}",
+                graph.name,
+                shortened(name),
+                known.join(", ")
+            )));
+        };
         if name == FOOTPRINT {
-            return Err(ProceduralError::SetAtEveryPoint { graph: graph.name.clone(), name: name.to_owned() });
+            return Err(ProceduralError::Unusable(format!(
+                "parameter '{name}' of '{}' cannot be set: it is the extent of a pixel at every point",
+                graph.name
+            )));
         }
+        let bad = |why: String| ProceduralError::Unusable(format!("parameter '{name}' of '{}': {why}", graph.name));
         let parameter = &graph.parameters[at];
-        let bad = |reason| ProceduralError::BadValue { graph: graph.name.clone(), name: name.to_owned(), reason };
-        let value = Value::parse(parameter.value.kind(), text).map_err(bad)?;
-        let slots = slots(graph);
-        for (slot, &found) in slots.iter().filter(|slot| slot.parameter == at).zip(value.numbers()) {
+        let value = Value::parse(parameter.value.kind(), text).map_err(|reason| bad(reason.to_string()))?;
+        for (slot, &found) in slots(graph).iter().filter(|slot| slot.parameter == at).zip(value.numbers()) {
             if slot.clamped(found) != found {
-                let (graph, name, least, most) = (graph.name.clone(), name.to_owned(), slot.least, slot.most);
-                return Err(ProceduralError::OutOfRange { graph, name, least, most, found });
+                let range = match (slot.least, slot.most) {
+                    (Some(least), Some(most)) => format!("{least} to {most}"),
+                    (Some(least), None) => format!("at least {least}"),
+                    (None, Some(most)) => format!("at most {most}"),
+                    (None, None) => "any number".to_owned(),
+                };
+                return Err(bad(format!("expected {range}, found {found}")));
             }
         }
         self.0[first_slot(graph, at)..][..value.numbers().len()].copy_from_slice(value.numbers());
         Ok(())
     }
-}
-
-fn unknown(graph: &Graph, name: &str) -> ProceduralError {
-    let known: Vec<&str> = graph.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-    ProceduralError::UnknownParameter { graph: graph.name.clone(), name: shortened(name), known: known.join(", ") }
 }

@@ -2,39 +2,22 @@
 
 use crate::error::ProceduralError;
 use crate::graph::Graph;
-use crate::mtlx::{Limits, read_text};
+use crate::mtlx::read_text;
+use crate::value::words;
 
-/// What kind of pattern a graph makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Class {
-    /// One colour.
-    Flat,
-    /// Random, and alike in all directions.
-    Isotropic,
-    /// Random, with a direction.
-    Oriented,
-    /// Periodic in one direction.
-    Stripe,
-    /// Periodic in two directions.
-    Lattice,
-}
-
-impl Class {
-    /// The word in tables and reports.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Flat => "flat",
-            Self::Isotropic => "isotropic",
-            Self::Oriented => "oriented",
-            Self::Stripe => "stripe",
-            Self::Lattice => "lattice",
-        }
-    }
-}
-
-impl serde::Serialize for Class {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.word())
+words! {
+    /// What kind of pattern a graph makes.
+    pub enum Class {
+        /// One colour.
+        Flat = "flat",
+        /// Random, and alike in all directions.
+        Isotropic = "isotropic",
+        /// Random, with a direction.
+        Oriented = "oriented",
+        /// Periodic in one direction.
+        Stripe = "stripe",
+        /// Periodic in two directions.
+        Lattice = "lattice",
     }
 }
 
@@ -93,6 +76,6 @@ pub fn entry(name: &str) -> Option<&'static Entry> {
 impl Entry {
     /// The graph. Fails only where the built-in file is faulty, which a test rules out.
     pub fn graph(&self) -> Result<Graph, ProceduralError> {
-        read_text(self.name, self.text, &Limits::default())
+        read_text(self.name, self.text)
     }
 }

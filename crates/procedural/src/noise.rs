@@ -11,12 +11,7 @@ pub fn cell(x: f64, y: f64) -> f64 {
     to_unit(hash2(cell_of(x).0, cell_of(y).0))
 }
 
-/// Component 0, 1 or 2 of a vector from 0 to 1 that is constant in each cell.
-pub fn cell_component(x: f64, y: f64, component: i32) -> f64 {
-    component_at(cell_of(x).0, cell_of(y).0, component)
-}
-
-/// As [`cell_component`], of the cell's whole numbers.
+/// Component 0, 1 or 2 of a vector from 0 to 1 that is constant in each cell, given by its whole numbers.
 fn component_at(x: i32, y: i32, component: i32) -> f64 {
     to_unit(hash3(x, y, component))
 }
@@ -150,7 +145,7 @@ pub fn nearest_cell(x: f64, y: f64, jitter: f64, channel: Channel) -> f64 {
     let [dx, dy] = nearest(x, y, jitter)[0].offset;
     match channel {
         Channel::Scalar => cell(x + dx, y + dy),
-        Channel::Component(at) => cell_component(x + dx, y + dy, i32::from(at)),
+        Channel::Component(at) => component_at(cell_of(x + dx).0, cell_of(y + dy).0, i32::from(at)),
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
-use mateval_baselines::{homogeneous, submission};
+use mateval_baselines::{bounds, submission};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::SurfaceIndex;
@@ -80,12 +80,12 @@ pub fn dataset() -> &'static Dataset {
 
 /// Writes the submission `gt`.
 pub fn write_truth(out: &Path) {
-    submission::write_truth(dataset(), out, false).unwrap();
+    bounds::write_truth(dataset(), out, false).unwrap();
 }
 
 /// Writes the baseline `grey`, whose roughness is the default.
 pub fn write_grey(out: &Path) {
-    homogeneous::write_grey(dataset(), out, false).unwrap();
+    bounds::write_grey(dataset(), out, false).unwrap();
 }
 
 /// Writes the truth of the photo lifted to the atlases, the rest by nearest neighbours.
@@ -126,7 +126,7 @@ pub fn blacken_unobserved(scene: &SceneFile, folder: &Path) {
 /// Writes `gt` with the base colour of every atlas (linear) changed.
 pub fn write_changed(out: &Path, change: impl Fn(&Picture<LinearRgb>) -> Picture<LinearRgb>) {
     let method = submission::Method::new("changed", "");
-    submission::write(dataset(), out, false, &method, &|_| (), |scene, instance, folder| {
+    submission::write(dataset(), out, false, &method, |scene, instance, folder| {
         let truth = dataset().folder(&scene.id).truth_material(&instance.id);
         let file = |map: Map| Path::new(map.stem()).with_extension("png");
         for map in [Map::Roughness, Map::Metallic] {

@@ -96,8 +96,6 @@ pub struct AssumedSurfaces<'a> {
     pub colors: &'a [[f32; 3]],
     /// The perceptual roughness of each surface.
     pub roughnesses: &'a [f32],
-    /// Whether each surface is a metal, whose light is gloss alone: it has its own colour for all paths.
-    pub metals: &'a [bool],
 }
 
 /// The light of a view, apart from the base colours of what it shows. One picture per light group, and one of the light
@@ -136,15 +134,14 @@ impl<'w> MaterialSource<'w, VARIANTS> for Split<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, scatterings: u32) -> Bsdf<'w, VARIANTS> {
-        let is_metal = self.assumed.metals[place.surface.0];
         let colors = match scatterings {
-            0 if !is_metal => [Vec3::ZERO, Vec3::ONE],
+            0 => [Vec3::ZERO, Vec3::ONE],
             _ => [Vec3::from_array(self.assumed.colors[place.surface.0]); VARIANTS],
         };
         let principled = Principled {
             base_color: colors[0],
             roughness: self.assumed.roughnesses[place.surface.0],
-            metallic: f32::from(u8::from(is_metal)),
+            metallic: 0.0,
             eta: eta_from_specular(SPECULAR),
             style: Principled::style(PrincipledFlavour::Blender, Some(self.tables)),
         };
@@ -171,7 +168,7 @@ pub fn split_light(
 ) -> Result<SplitLight, TracerError> {
     settings.check()?;
     let expected = world.scene().surfaces.len();
-    for found in [assumed.colors.len(), assumed.roughnesses.len(), assumed.metals.len()] {
+    for found in [assumed.colors.len(), assumed.roughnesses.len()] {
         if found != expected {
             return Err(RequestFault::OtherWorld { found, expected }.into());
         }

@@ -1,6 +1,5 @@
 //! The files of `mateval baseline delight`: pictures, `lights.json`, and a page with what was found in each photo.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use mateval_dataset::open::Dataset;
@@ -11,7 +10,7 @@ use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_pages::{figure, plain};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::room::FittedLight;
 use super::{CandidateLights, DelightOptions, DelitPhoto, delight};
@@ -19,24 +18,14 @@ use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
 use crate::submission::check_new_place;
 
-pub(super) const LIGHTS_FORMAT: &str = "mateval-fitted-lights/2";
-
-/// The fitted lights of a scene.
-#[derive(Debug, Serialize, Deserialize)]
-pub(super) struct LightsFile {
-    /// [`LIGHTS_FORMAT`].
-    pub(super) format: String,
+/// The fitted lights of a scene, `lights.json`.
+#[derive(Serialize)]
+struct LightsFile<'a> {
+    format: &'static str,
     /// Which lights were given the chance to shine.
-    pub(super) candidates: CandidateLights,
+    candidates: CandidateLights,
     /// Candidates of the room first, then the lights of the stage.
-    pub(super) lights: Vec<FittedLight>,
-}
-
-impl LightsFile {
-    /// The names of the lights.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
-        self.lights.iter().map(|fitted| fitted.light.name.as_str())
-    }
+    lights: &'a [FittedLight],
 }
 
 /// De-lights the photo of every scene. `out` receives `index.html` and for each scene a folder with `base_color.exr`,
@@ -50,7 +39,7 @@ pub fn write(
 ) -> Result<usize, BaselineError> {
     check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;
-    let mut scenes = Vec::new();
+    let mut sections = String::new();
     for (at, scene) in dataset.scenes.iter().enumerate() {
         progress(Report::part(&format!("scene {}", scene.id), at, dataset.scenes.len()));
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
@@ -58,15 +47,19 @@ pub fn write(
         let folder = work.path().join(scene.id.as_str());
         std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
         write_pictures(&folder, &delit, scene.exposure as f32)?;
-        let shown = Shown { id: scene.id.to_string(), lights: delit.lights.clone(), rounds: delit.rounds };
-        let lights = LightsFile { format: LIGHTS_FORMAT.to_owned(), candidates: options.lights, lights: delit.lights };
+        let lights =
+            LightsFile { format: "mateval-fitted-lights/2", candidates: options.lights, lights: &delit.lights };
         json::write(&folder.join("lights.json"), &lights)?;
-        scenes.push(shown);
+        sections.push_str(&section(scene.id.as_str(), &delit));
     }
     let index = work.path().join("index.html");
-    std::fs::write(&index, html(&scenes)).map_err(FileError::io("write", &index))?;
+    // Ids and names of lights contain no characters that are special in HTML.
+    let introduction = "A photo is base colour times the light on a white surface, plus light that does not depend on \
+                        base colour.";
+    std::fs::write(&index, plain("De-lit photos", introduction, &sections, ""))
+        .map_err(FileError::io("write", &index))?;
     work.finish()?;
-    Ok(scenes.len())
+    Ok(dataset.scenes.len())
 }
 
 /// `exposure` is that of the scene, for the pictures that people look at.
@@ -92,15 +85,8 @@ fn write_pictures(folder: &Path, delit: &DelitPhoto, exposure: f32) -> Result<()
 }
 
 /// A linear picture times `exposure` as people see it.
-pub(super) fn exposed(picture: &Picture<LinearRgb>, exposure: f32) -> Picture<SrgbRgb> {
+fn exposed(picture: &Picture<LinearRgb>, exposure: f32) -> Picture<SrgbRgb> {
     picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (v * exposure).clamp(0.0, 1.0)))).to_srgb()
-}
-
-/// A scene on the page.
-pub(super) struct Shown {
-    pub(super) id: String,
-    pub(super) lights: Vec<FittedLight>,
-    pub(super) rounds: usize,
 }
 
 const PICTURES: [(&str, &str); 7] = [
@@ -113,23 +99,15 @@ const PICTURES: [(&str, &str); 7] = [
     ("metallic", "Metallic: white is a mirror"),
 ];
 
-/// The page. Ids and names of lights contain no characters that are special in HTML.
-pub(super) fn html(scenes: &[Shown]) -> String {
-    let introduction = "A photo is base colour times the light on a white surface, plus light that does not depend on \
-                        base colour. <code>mateval baseline relight</code> lights the rooms anew.";
-    plain("De-lit photos", introduction, &scenes.iter().map(section).collect::<String>(), "")
-}
-
-fn section(Shown { id, lights, rounds }: &Shown) -> String {
+fn section(id: &str, delit: &DelitPhoto) -> String {
     let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
     text.extend(PICTURES.map(|(file, caption)| figure(&format!("{id}/{file}.png"), id, caption)));
-    let count = lights.len();
-    text.push_str("</div><details><summary>");
-    write!(text, "{count} lights after {rounds} rounds").expect("writing to a String cannot fail");
-    text.push_str(
-        "</summary><div class=\"wide\"><table><thead><tr><th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr></thead><tbody>\n",
-    );
-    text.extend(lights.iter().map(|FittedLight { light, radiance: [r, g, b] }| {
+    let (count, rounds) = (delit.lights.len(), delit.rounds);
+    text.push_str(&format!(
+        "</div><details><summary>{count} lights after {rounds} rounds</summary><div class=\"wide\"><table><thead><tr>\
+         <th>Light</th><th>Red</th><th>Green</th><th>Blue</th></tr></thead><tbody>\n"
+    ));
+    text.extend(delit.lights.iter().map(|FittedLight { light, radiance: [r, g, b] }| {
         format!("<tr><th scope=\"row\">{}</th><td>{r:.4}</td><td>{g:.4}</td><td>{b:.4}</td></tr>\n", light.name)
     }));
     text.push_str("</tbody></table></div></details></section>\n");

@@ -11,7 +11,6 @@
 
 mod files;
 mod mirrors;
-pub mod relight;
 mod room;
 mod surfaces;
 
@@ -19,7 +18,7 @@ use mateval_dataset::{Progress, Report};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::joint_fit::{JointFitRules, JointTarget, fit_jointly};
 use mateval_tracer::noise_filter::{self, filtered_mean};
-use mateval_tracer::{PhotoCache, SplitLight, split_light};
+use mateval_tracer::{PhotoCache, split_light};
 
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
@@ -43,8 +42,6 @@ pub struct DelightOptions {
     pub most_rounds: usize,
     /// How light and colour are separated.
     pub fit: JointFitRules,
-    /// The seed of all paths.
-    pub seed: u64,
 }
 
 impl Default for DelightOptions {
@@ -55,7 +52,6 @@ impl Default for DelightOptions {
             photo_cache: true,
             most_rounds: 4,
             fit: JointFitRules::default(),
-            seed: 0,
         }
     }
 }
@@ -123,7 +119,7 @@ fn run(room: &PartRoom, options: &DelightOptions, progress: Progress<'_>) -> Res
         // Two independent halves, whose difference is the noise. The same paths in every round, so that a change is
         // none of noise.
         let half = |half: u64| {
-            let settings = settings((samples / 2).max(1), options.seed.wrapping_add(half));
+            let settings = settings((samples / 2).max(1), half);
             let step = format!("round {}, half {}", round + 1, ["a", "b"][half as usize]);
             split_light(&room.world, &cache, &room.valid, surfaces.assumed(), &settings, &|done, total| {
                 progress(Report::step(&step, done, total));
@@ -135,7 +131,11 @@ fn run(room: &PartRoom, options: &DelightOptions, progress: Progress<'_>) -> Res
         let fit = fit_jointly(&options.fit, &target);
         // The weights of a basis: the radiances, and 1 for what the photo lights.
         let weights: Vec<[f64; 3]> = fit.radiances.iter().copied().chain([[1.0; 3]]).collect();
-        let halves = weighted(&halves, &weights)?;
+        let [a, b] = &halves;
+        let halves = LightHalves {
+            diffuse: [a.diffuse.weighted(&weights)?, b.diffuse.weighted(&weights)?],
+            gloss: [a.gloss.weighted(&weights)?, b.gloss.weighted(&weights)?],
+        };
         let light = fitted_light(room, &halves);
         let found = part_colors(room, &light.base_color);
         let changes = surfaces.colors.iter().flatten().zip(found.iter().flatten()).map(|(a, b)| (a - b).abs());
@@ -143,7 +143,7 @@ fn run(room: &PartRoom, options: &DelightOptions, progress: Progress<'_>) -> Res
         surfaces.colors = found;
         round += 1;
         if round < options.samples.len() {
-            surfaces.roughnesses = choose_roughness(room, &cache, &surfaces, &weights, options.seed, progress)?;
+            surfaces.roughnesses = choose_roughness(room, &cache, &surfaces, &weights, progress)?;
         }
         if (round >= options.samples.len() && change <= SETTLED) || round >= options.most_rounds {
             break (fit, halves, light);
@@ -193,18 +193,12 @@ struct RoundLight {
     base_color: Picture<LinearRgb>,
 }
 
-/// The light of all lights, each with its weight.
-fn weighted(halves: &[SplitLight; 2], weights: &[[f64; 3]]) -> Result<LightHalves, BaselineError> {
-    let [a, b] = halves;
-    Ok(LightHalves {
-        diffuse: [a.diffuse.weighted(weights)?, b.diffuse.weighted(weights)?],
-        gloss: [a.gloss.weighted(weights)?, b.gloss.weighted(weights)?],
-    })
-}
-
 /// The light without noise, and the photo divided by it.
 fn fitted_light(room: &PartRoom, halves: &LightHalves) -> RoundLight {
-    let (diffuse, gloss) = (filtered(room, &halves.diffuse), filtered(room, &halves.gloss));
+    // The light does not depend on base colour.
+    let surfaces =
+        noise_filter::Surfaces { base_color: None, instances: &room.parts, normals: &room.normals, valid: &room.valid };
+    let [diffuse, gloss] = [&halves.diffuse, &halves.gloss].map(|[a, b]| filtered_mean([a, b], &surfaces));
     let least = LEAST_SHADING * mean(room);
     let base_color = Picture::from_fn(room.photo.width(), room.photo.height(), |x, y| {
         if !room.valid.get(x, y) {
@@ -214,13 +208,6 @@ fn fitted_light(room: &PartRoom, halves: &LightHalves) -> RoundLight {
         LinearRgb([0, 1, 2].map(|c| ((photo[c] - gloss[c]) / diffuse[c].max(least)).clamp(0.0, 1.0)))
     });
     RoundLight { diffuse, gloss, base_color }
-}
-
-/// The mean of two halves of light that does not depend on base colour, without its noise.
-fn filtered(room: &PartRoom, [a, b]: &[Picture<LinearRgb>; 2]) -> Picture<LinearRgb> {
-    let surfaces =
-        noise_filter::Surfaces { base_color: None, instances: &room.parts, normals: &room.normals, valid: &room.valid };
-    filtered_mean([a, b], &surfaces)
 }
 
 /// The mean luminance of the photo's valid pixels, above 0.
@@ -311,7 +298,6 @@ mod tests {
 
     use super::room::NO_PART;
     use super::*;
-    use super::{LightSource, PossibleLight};
 
     const SIZE: [u32; 2] = [96, 54];
     /// Lamps that bring less of the photo's light are not well known.
@@ -437,18 +423,7 @@ mod tests {
         let lights = (0..lamps.len()).map(light).collect();
         let owners = (0..scene.surfaces.len()).collect();
         Planted {
-            room: PartRoom {
-                world,
-                shown: vec![None; 3],
-                lights,
-                camera,
-                emission: photo.map(|_| None),
-                photo,
-                valid,
-                parts,
-                normals,
-                owners,
-            },
+            room: PartRoom { world, shown: vec![None; 3], lights, camera, photo, valid, parts, normals, owners },
             truth,
             radiances,
         }

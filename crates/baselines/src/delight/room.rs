@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use mateval_dataset::dataset::Instance;
-use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_dataset::{Camera, SceneError, glb};
@@ -17,12 +16,12 @@ use mateval_light::light_stage::{NamedLight, scene_lights};
 use mateval_tracer::aov::PixelHit;
 use mateval_tracer::{World, aov};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::error::BaselineError;
-use crate::geometry::SceneGeometry;
+use crate::geometry::{SceneGeometry, photo_file};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CandidateLights {
     /// What may glow in the room, the world around it, and the lights of a stage.
@@ -52,8 +51,6 @@ pub(super) struct PartRoom {
     pub(super) parts: Picture<u16>,
     /// World-space normals, towards the camera.
     pub(super) normals: Picture<Normal>,
-    /// The light, by its place in `lights`, whose emission each pixel shows.
-    pub(super) emission: Picture<Option<usize>>,
     /// The instance of each surface.
     pub(super) owners: Vec<usize>,
 }
@@ -92,17 +89,13 @@ impl PartRoom {
             candidates.iter().position(|candidate| shows(geometry, *candidate, owner, [x, y]))
         });
         let shown = (0..lights.len()).map(|light| mean_of_pixels(&photo, &emission, light)).collect();
-        Ok(Self { world, lights, shown, camera, photo, valid, parts, normals, emission, owners })
+        Ok(Self { world, lights, shown, camera, photo, valid, parts, normals, owners })
     }
 }
 
 /// The photo as it was rendered: linear, before exposure, with radiances above 1. A denoiser may leave values below 0.
 fn photo(geometry: &SceneGeometry<'_>) -> Result<Picture<LinearRgb>, BaselineError> {
-    let folder: &SceneFolder = &geometry.folder;
-    let path = folder.view(&geometry.view.id).join("rgb.exr");
-    if !path.is_file() {
-        return Err(BaselineError::NoPhoto(path));
-    }
+    let path = photo_file(&geometry.folder, geometry.view)?;
     let photo = read_linear(&path)?;
     if !photo.same_size(&geometry.valid) {
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
@@ -211,7 +204,7 @@ fn grey() -> Material {
 }
 
 /// A light that may shine, of radiance 1.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PossibleLight {
     /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage; unique in
     /// its scene.
@@ -219,7 +212,7 @@ pub struct PossibleLight {
     pub source: LightSource,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum LightSource {
     /// Both sides of all surfaces of an instance.
@@ -243,7 +236,7 @@ pub enum LightSource {
 }
 
 /// A light with the radiance that was fitted to it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FittedLight {
     #[serde(flatten)]
     pub light: PossibleLight,

@@ -28,22 +28,16 @@ pub(super) struct Surfaces {
     pub(super) colors: Vec<[f32; 3]>,
     /// The perceptual roughness of each.
     pub(super) roughnesses: Vec<f32>,
-    /// Whether each is a metal.
-    pub(super) metals: Vec<bool>,
 }
 
 impl Surfaces {
     /// `count` surfaces of which nothing is known.
     pub(super) fn unknown(count: usize) -> Self {
-        Self {
-            colors: vec![[USUAL_COLOR; 3]; count],
-            roughnesses: vec![USUAL_ROUGHNESS; count],
-            metals: vec![false; count],
-        }
+        Self { colors: vec![[USUAL_COLOR; 3]; count], roughnesses: vec![USUAL_ROUGHNESS; count] }
     }
 
     pub(super) fn assumed(&self) -> AssumedSurfaces<'_> {
-        AssumedSurfaces { colors: &self.colors, roughnesses: &self.roughnesses, metals: &self.metals }
+        AssumedSurfaces { colors: &self.colors, roughnesses: &self.roughnesses }
     }
 }
 
@@ -105,19 +99,17 @@ pub(super) fn choose_roughness(
     cache: &PhotoCache<'_>,
     surfaces: &Surfaces,
     weights: &[[f64; 3]],
-    seed: u64,
     progress: Progress<'_>,
 ) -> Result<Vec<f32>, BaselineError> {
     let (width, height) = (room.photo.width(), room.photo.height());
     let wanted = Mask::from_fn(width, height, |x, y| x % STEP == 0 && y % STEP == 0 && room.valid.get(x, y));
     let misfits_at = |roughness: f32| -> Result<BTreeMap<u16, f64>, BaselineError> {
         let roughnesses = vec![roughness; surfaces.roughnesses.len()];
-        let all = Surfaces { colors: surfaces.colors.clone(), roughnesses, metals: surfaces.metals.clone() };
+        let assumed = AssumedSurfaces { roughnesses: &roughnesses, ..surfaces.assumed() };
         let step = format!("roughness {roughness}");
-        let split =
-            split_light(&room.world, cache, &wanted, all.assumed(), &settings(SAMPLES, seed), &|done, total| {
-                progress(Report::step(&step, done, total));
-            })?;
+        let split = split_light(&room.world, cache, &wanted, assumed, &settings(SAMPLES, 0), &|done, total| {
+            progress(Report::step(&step, done, total));
+        })?;
         let [diffuse, gloss] =
             [split.diffuse.weighted(weights)?, split.gloss.weighted(weights)?].map(|p| p.map(|v| v.luminance()));
         Ok(misfits(room, &wanted, &diffuse, &gloss))

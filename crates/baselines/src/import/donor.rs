@@ -1,15 +1,64 @@
-//! A donor: another method's mesh of a scene's surfaces, with the materials that are transferred to the atlases.
+//! A donor: another method's mesh of a scene's surfaces, with the materials that are transferred to the atlases; how
+//! large it may be, and why its file was refused.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::{DVec3, Vec2, Vec3};
+use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::material::MaterialParameter;
-use mateval_image::Texture;
+use mateval_files::source_folder::FileFault;
+use mateval_files::untrusted::shortened;
+use mateval_image::{ImageError, Texture};
 
-use super::error::{ImportError, Limited, MAX_TRIANGLES};
 use crate::estimate::{GivenMaps, Values};
 use crate::maps::DEFAULT;
+
+/// Largest number of triangles in a file.
+pub(super) const MAX_TRIANGLES: usize = 5_000_000;
+/// Largest number of texels in all textures of a file.
+const MAX_TEXELS: usize = 1 << 28;
+/// Largest size of a file, and of all buffers of a glTF together, in bytes.
+pub(super) const MAX_FILE_BYTES: u64 = 1 << 31;
+
+/// Why a file was refused. The caller adds the file's path.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum ImportError {
+    #[error("{0}")]
+    Invalid(String),
+    /// The file, or one that it names, is missing, unreadable, too large or outside the folder.
+    #[error("{}", .0.message)]
+    File(FileFault),
+    #[error(transparent)]
+    Gltf(#[from] GltfError),
+    #[error(transparent)]
+    Texture(#[from] ImageError),
+}
+
+impl From<FileFault> for ImportError {
+    fn from(fault: FileFault) -> Self {
+        Self::File(fault)
+    }
+}
+
+/// Fails where a file has more of something than is read.
+pub(super) fn check_most(found: usize, most: usize, what: &str) -> Result<(), ImportError> {
+    if found > most { Err(ImportError::Invalid(format!("the file has more than {most} {what}"))) } else { Ok(()) }
+}
+
+/// Adds a texture to the texels of a file so far, and fails where they are too many.
+pub(super) fn count_texels(texels: &mut usize, texture: &Texture) -> Result<(), ImportError> {
+    *texels += texture.width() * texture.height();
+    check_most(*texels, MAX_TEXELS, "texels in its textures")
+}
+
+/// The error about a colour that is out of range. `key` is such as `Kd`, or the JSON pointer of a glTF.
+pub(super) fn out_of_range(key: &str, material: &str, found: &[f32]) -> ImportError {
+    // Numbers that end little above 1 are not those of bytes.
+    let are_bytes = found.iter().any(|v| *v > 2.0) && found.iter().all(|v| (0.0..=255.0).contains(v));
+    let hint = if are_bytes { "; divide by 255" } else { "" };
+    ImportError::Invalid(format!("{key} of '{}': expected 0 to 1, found {found:?}{hint}", shortened(material)))
+}
 
 /// Triangles in the dataset's world space, each with a material.
 #[derive(Default)]
@@ -24,38 +73,6 @@ pub struct Donor {
     pub groups: Vec<DonorGroup>,
     /// Number of triangles that have textures and no texture coordinates.
     pub without_uv: usize,
-}
-
-impl DonorMaterial {
-    /// The material with the mean in place of the texture of base colour, and of those of roughness and metallic.
-    fn flattened(&self, [base, numbers]: [bool; 2]) -> Self {
-        let mut flat = self.clone();
-        if base && let (factor, Some(texture)) = &self.base_color {
-            let mean = mean_of(texture);
-            flat.base_color = (std::array::from_fn(|channel| factor[channel] * mean[channel]), None);
-        }
-        for scalar in [&mut flat.roughness, &mut flat.metallic].into_iter().flatten().filter(|_| numbers) {
-            if let Some((texture, channel)) = scalar.texture.take() {
-                scalar.factor *= mean_of(&texture)[channel];
-            }
-        }
-        flat
-    }
-}
-
-/// The shift, for a mesh whose place is nearer to it than to the origin; otherwise the mesh is near the origin, as the
-/// dataset's own files are.
-pub(super) fn shift_near(place: DVec3, shift: DVec3) -> DVec3 {
-    if place.distance(shift) < place.length() { shift } else { DVec3::ZERO }
-}
-
-/// The mean of all texels, summed in f64.
-fn mean_of(texture: &Texture) -> [f32; 3] {
-    let mut sum = [0.0; 3];
-    for (x, y) in (0..texture.height()).flat_map(|y| (0..texture.width()).map(move |x| (x, y))) {
-        sum.iter_mut().zip(texture.texel(x, y)).for_each(|(sum, value)| *sum += f64::from(value));
-    }
-    sum.map(|sum: f64| (sum / (texture.width() * texture.height()) as f64) as f32)
 }
 
 /// A node of a glTF, or a group of an OBJ.
@@ -107,6 +124,38 @@ pub struct Scalar {
     pub texture: Option<(Texture, usize)>,
 }
 
+impl DonorMaterial {
+    /// The material with the mean in place of the texture of base colour, and of those of roughness and metallic.
+    fn flattened(&self, [base, numbers]: [bool; 2]) -> Self {
+        let mut flat = self.clone();
+        if base && let (factor, Some(texture)) = &self.base_color {
+            let mean = mean_of(texture);
+            flat.base_color = (std::array::from_fn(|channel| factor[channel] * mean[channel]), None);
+        }
+        for scalar in [&mut flat.roughness, &mut flat.metallic].into_iter().flatten().filter(|_| numbers) {
+            if let Some((texture, channel)) = scalar.texture.take() {
+                scalar.factor *= mean_of(&texture)[channel];
+            }
+        }
+        flat
+    }
+}
+
+/// The shift, for a mesh whose place is nearer to it than to the origin; otherwise the mesh is near the origin, as the
+/// dataset's own files are.
+pub(super) fn shift_near(place: DVec3, shift: DVec3) -> DVec3 {
+    if place.distance(shift) < place.length() { shift } else { DVec3::ZERO }
+}
+
+/// The mean of all texels, summed in f64.
+fn mean_of(texture: &Texture) -> [f32; 3] {
+    let mut sum = [0.0; 3];
+    for (x, y) in (0..texture.height()).flat_map(|y| (0..texture.width()).map(move |x| (x, y))) {
+        sum.iter_mut().zip(texture.texel(x, y)).for_each(|(sum, value)| *sum += f64::from(value));
+    }
+    sum.map(|sum: f64| (sum / (texture.width() * texture.height()) as f64) as f32)
+}
+
 impl Donor {
     /// Whether the file states the triangle's base colour, by its material or at its corners.
     fn states_base_color(&self, triangle: &DonorTriangle) -> bool {
@@ -139,7 +188,12 @@ impl Donor {
         }
         let glowing = self.triangles.iter().map(|triangle| &self.materials[triangle.material]).find(|m| m.glows);
         let material = glowing.unwrap_or(&self.materials[self.triangles[0].material]);
-        Err(ImportError::NoBaseColor { material: material.name.clone(), glows: material.glows })
+        let advice = match material.glows {
+            true => ", which has an emissive texture over black or white: baked colours belong into baseColorTexture",
+            false => ": bake it to a texture, or state baseColorFactor or COLOR_0",
+        };
+        let name = shortened(&material.name);
+        Err(ImportError::Invalid(format!("no material states a base colour, such as '{name}'{advice}")))
     }
 
     /// Gives the mean of its textures to every triangle without texture coordinates, which are NaN. Returns their
@@ -176,11 +230,8 @@ impl Donor {
     }
 
     pub(super) fn push(&mut self, triangle: DonorTriangle) -> Result<(), ImportError> {
-        if self.triangles.len() >= MAX_TRIANGLES {
-            return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });
-        }
         self.triangles.push(triangle);
-        Ok(())
+        check_most(self.triangles.len(), MAX_TRIANGLES, "triangles")
     }
 
     /// Which maps the materials of its triangles give.
@@ -253,10 +304,18 @@ mod tests {
     }
 
     #[test]
+    fn only_numbers_of_bytes_are_to_be_divided() {
+        let text = |found: &[f32]| out_of_range("Kd", "m", found).to_string();
+        assert!(text(&[255.0, 128.0, 0.0]).ends_with("found [255.0, 128.0, 0.0]; divide by 255"));
+        assert!(text(&[1.5, 1.0, 1.0]).ends_with("expected 0 to 1, found [1.5, 1.0, 1.0]"));
+        assert!(text(&[-1.0, 3.0, 0.0]).ends_with("found [-1.0, 3.0, 0.0]"));
+    }
+
+    #[test]
     fn a_colour_that_lies_in_the_emission_is_refused() {
         for constant in [0.0, 1.0] {
-            let refused = donor([constant; 3], true, false).check_base_color();
-            assert!(matches!(refused, Err(ImportError::NoBaseColor { glows: true, .. })), "{constant}");
+            let refused = donor([constant; 3], true, false).check_base_color().unwrap_err().to_string();
+            assert!(refused.contains("has an emissive texture over black or white"), "{constant}: {refused}");
         }
         // Twins: without an emissive texture, with another colour, and with colours of the vertices.
         for (constant, glows, is_painted) in [(1.0, false, false), (0.5, true, false), (1.0, true, true)] {

@@ -9,11 +9,11 @@ use mateval_dataset::dataset::{Instance, SceneFile};
 use mateval_dataset::{InstanceId, PartSetId, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::donor::Donor;
-use super::error::{ImportError, MAX_FILE_BYTES, MaterialFault};
+use super::donor::{Donor, ImportError, MAX_FILE_BYTES};
 use super::{gltf_donor, obj_donor};
 use crate::error::BaselineError;
 use crate::estimate::{GivenMaps, Values};
@@ -99,18 +99,18 @@ impl ImportFolder {
 
     /// The path of a file; an error where it leads out of the folder.
     pub fn checked_path(&self, name: &str) -> Result<PathBuf, BaselineError> {
-        self.folder()?.path(name).map_err(|fault| self.refused(name, fault.into()))
+        self.folder()?.path(name).map_err(|fault| self.refused(name, &fault.into()))
     }
 
     /// Reads a mesh and its textures, and no file outside the folder. `shift` is what the dataset subtracted from the
     /// source's positions; it is subtracted from meshes in the source's space.
     pub fn read_mesh(&self, name: &str, shift: DVec3) -> Result<Donor, BaselineError> {
         let read = if name.ends_with(".obj") { obj_donor::read } else { gltf_donor::read };
-        read(&mut self.folder()?, name, shift).map_err(|source| self.refused(name, source))
+        read(&mut self.folder()?, name, shift).map_err(|source| self.refused(name, &source))
     }
 
-    fn refused(&self, name: &str, source: ImportError) -> BaselineError {
-        BaselineError::BadImport { path: self.path.join(name), source }
+    fn refused(&self, name: &str, source: &ImportError) -> BaselineError {
+        BaselineError::Unusable(format!("'{}': {source}", self.path.join(name).display()))
     }
 
     fn folder(&self) -> Result<SourceFolder, BaselineError> {
@@ -159,12 +159,12 @@ pub fn read_flat_materials<'a>(
     let instances = geometry.scene.instances.iter().map(|instance| instance.id.as_str());
     let known: BTreeSet<&str> = parts.iter().map(|part| part.id.as_str()).chain(instances).collect();
     let unknown = materials.keys().filter(|id| !known.contains(id.as_str()));
-    let unknown = unknown.map(|id| MaterialFault::UnknownId(id.clone()));
+    let unknown = unknown.map(|id| format!("/{}: expected the id of a part or an instance", shortened(id)));
     let out_of_range = materials.iter().filter(|(_, material)| !material.is_in_range());
-    let out_of_range = out_of_range.map(|(id, _)| MaterialFault::OutOfRange(id.clone()));
-    let faults: Vec<MaterialFault> = unknown.chain(out_of_range).collect();
+    let out_of_range = out_of_range.map(|(id, _)| format!("/{}: expected numbers from 0 to 1", shortened(id)));
+    let faults: Vec<String> = unknown.chain(out_of_range).collect();
     if !faults.is_empty() {
-        return Err(BaselineError::BadImport { path: path.to_owned(), source: ImportError::Materials(faults) });
+        return Err(BaselineError::Unusable(format!("'{}': {}", path.display(), faults.join("; "))));
     }
     let colors = PartColors::new(triangles, |part, instance| {
         let own = materials.get(parts[part].id.as_str());

@@ -8,18 +8,22 @@ use glam::{DMat4, DVec3, Mat2, Vec2, Vec3};
 use gltf::Semantic;
 use gltf::material::PbrSpecularGlossiness;
 use gltf::mesh::Mode;
-use mateval_dataset::gltf_file::{GltfFile, INSTANCING, parse};
-use mateval_dataset::gltf_file::{first_numbers, indices, numbers, triangles, view_bytes};
+use mateval_dataset::gltf_file::{GltfFile, INSTANCING, first_numbers, indices, numbers, parse, triangles, view_bytes};
 use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 
-use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
-use super::error::{
-    ImportError, Limited, MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES, Place, Unsupported,
+use super::donor::{
+    Donor, DonorGroup, DonorMaterial, DonorTriangle, ImportError, MAX_FILE_BYTES, MAX_TRIANGLES, Scalar, check_most,
+    count_texels, out_of_range, shift_near,
 };
 
+/// Largest number of vertices in a file; a mesh that several nodes share counts for each of them.
+const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
+/// Largest depth of the tree of nodes.
+const MAX_DEPTH: usize = 64;
 /// Numbers this far outside 0 to 1 are rounding, and are clamped.
 const ROUNDING: f32 = 0.001;
 
@@ -32,10 +36,8 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
     let mut bytes = 0;
     for buffer in file.document.buffers() {
         let read = reader.buffer(&buffer, file.blob.as_deref())?;
-        bytes += read.len() as u64;
-        if bytes > MAX_FILE_BYTES {
-            return Err(ImportError::TooLarge { what: Limited::BufferBytes, limit: MAX_FILE_BYTES });
-        }
+        bytes += read.len();
+        check_most(bytes, MAX_FILE_BYTES as usize, "bytes in its buffers")?;
         reader.buffers.push(read);
     }
     let mut donor = Donor::default();
@@ -71,17 +73,20 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn buffer(&mut self, buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>) -> Result<Vec<u8>, ImportError> {
         match buffer.source() {
-            gltf::buffer::Source::Bin => blob.map(<[u8]>::to_vec).ok_or(ImportError::BufferWithoutData),
+            gltf::buffer::Source::Bin => blob
+                .map(<[u8]>::to_vec)
+                .ok_or_else(|| invalid("the first buffer has no data; expected a uri or a binary chunk")),
             gltf::buffer::Source::Uri(uri) => self.file(uri),
         }
     }
 
     fn file(&mut self, uri: &str) -> Result<Vec<u8>, ImportError> {
         if uri.starts_with("data:") {
-            return Err(ImportError::Unsupported(Unsupported::DataUri));
+            return Err(invalid("data uris are not read; write a .glb, or files beside the .gltf"));
         }
         let decoded = percent_encoding::percent_decode_str(uri).decode_utf8();
-        let name = decoded.map_err(|source| ImportError::Uri { uri: uri.to_owned(), source })?;
+        let not_utf8 = |source| invalid(format!("the uri '{}' is not UTF-8: {source}", shortened(uri)));
+        let name = decoded.map_err(not_utf8)?;
         let name = if self.beside.is_empty() { name.into_owned() } else { format!("{}/{name}", self.beside) };
         let relative = SourceFolder::relative(&name)?;
         Ok(self.folder.read(&relative)?)
@@ -192,29 +197,27 @@ impl Reader<'_> {
         }
         let (name, bytes) = self.picture(&image)?;
         let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap)?;
-        self.texels += read.width() * read.height();
-        if self.texels > MAX_TEXELS {
-            return Err(ImportError::TooLarge { what: Limited::Texels, limit: MAX_TEXELS as u64 });
-        }
+        count_texels(&mut self.texels, &read)?;
         self.textures.insert(key, read.clone());
         Ok(read)
     }
 
     fn walk(&self, file: &gltf::Document, shift: DVec3, donor: &mut Donor) -> Result<(), ImportError> {
-        let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or(ImportError::NoScene)?;
+        let scene = file.default_scene().or_else(|| file.scenes().next());
+        let scene = scene.ok_or_else(|| invalid("the file has no scene"))?;
         let mut visited = BTreeSet::new();
         let mut open: Vec<(gltf::Node<'_>, DMat4, Vec<String>)> =
             scene.nodes().map(|node| (node, DMat4::IDENTITY, Vec::new())).collect();
         open.reverse();
         while let Some((node, world_from_parent, above)) = open.pop() {
             if !visited.insert(node.index()) {
-                return Err(ImportError::NotATree { node: node.index() });
+                return Err(invalid(format!("node {} is the child of two nodes; expected a tree", node.index())));
             }
             if node.extension_value(INSTANCING).is_some() {
-                return Err(ImportError::Unsupported(Unsupported::Instancing));
+                return Err(invalid("EXT_mesh_gpu_instancing is not read here; write a node for each copy"));
             }
             if above.len() >= MAX_DEPTH {
-                return Err(ImportError::TooDeep { node: node.index() });
+                return Err(invalid(format!("node {} is nested more than {MAX_DEPTH} deep", node.index())));
             }
             let world_from_node =
                 world_from_parent * DMat4::from_cols_array_2d(&node.transform().matrix().map(|c| c.map(f64::from)));
@@ -222,10 +225,8 @@ impl Reader<'_> {
             let names: Vec<String> = std::iter::once(own).chain(above).collect();
             let first = donor.triangles.len();
             for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-                let in_node = |source| ImportError::Node {
-                    node: node.index(),
-                    name: names.first().cloned().unwrap_or_default(),
-                    source: Box::new(source),
+                let in_node = |source: ImportError| {
+                    invalid(format!("node {} '{}': {source}", node.index(), shortened(&names[0])))
                 };
                 self.primitive(&primitive, world_from_node, shift, donor).map_err(in_node)?;
             }
@@ -246,46 +247,39 @@ impl Reader<'_> {
             Mode::Triangles => {}
             Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
             Mode::TriangleStrip | Mode::TriangleFan => {
-                return Err(ImportError::Unsupported(Unsupported::StripsAndFans));
+                return Err(invalid("strips and fans are not read; write triangles"));
             }
         }
-        let missing = |attribute: String| ImportError::MissingAttribute { attribute };
-        let positions = primitive.get(&Semantic::Positions).ok_or_else(|| missing("POSITION".to_owned()))?;
+        let positions = primitive.get(&Semantic::Positions);
+        let positions = positions.ok_or_else(|| invalid("expected the attribute POSITION, found none"))?;
         donor.vertices += positions.count();
-        if donor.vertices > MAX_VERTICES {
-            return Err(ImportError::TooLarge { what: Limited::Vertices, limit: MAX_VERTICES as u64 });
-        }
+        check_most(donor.vertices, MAX_VERTICES, "vertices, counted for each node that has them")?;
         let world = |place: [f32; 3]| world_from_node.transform_point3(DVec3::from(place.map(f64::from)));
         let positions: Vec<DVec3> = numbers::<3>(&positions, &self.buffers)?.into_iter().map(world).collect();
         let shift = positions.first().map_or(DVec3::ZERO, |first| shift_near(*first, shift));
         let positions: Vec<Vec3> = positions.into_iter().map(|place| (place - shift).as_vec3()).collect();
         if !positions.iter().all(|place| place.is_finite()) {
-            return Err(ImportError::NotFinite(Place::WorldPosition));
+            return Err(invalid("a position, once its node's transform is applied, is not finite"));
         }
         let corners = match primitive.indices() {
-            Some(accessor) if accessor.count() > 3 * MAX_TRIANGLES => {
-                return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });
+            Some(accessor) => {
+                check_most(accessor.count().div_ceil(3), MAX_TRIANGLES, "triangles")?;
+                indices(&accessor, &self.buffers)?
             }
-            Some(accessor) => indices(&accessor, &self.buffers)?,
             None => (0..positions.len() as u32).collect(),
         };
         let triangles = triangles(corners, positions.len())?;
-        let same_count = |found: usize, attribute: String| match found == positions.len() {
-            true => Ok(()),
-            false => Err(ImportError::Count { attribute, found, expected: positions.len() }),
+        let same_count = |found: usize, attribute: &str| match positions.len() {
+            expected if found == expected => Ok(()),
+            expected => Err(invalid(format!("{attribute} has {found} entries; expected {expected}, as POSITION has"))),
         };
         let colors = match primitive.get(&Semantic::Colors(0)) {
-            Some(accessor) if accessor.count() > positions.len() => {
-                return Err(ImportError::Count {
-                    attribute: "COLOR_0".to_owned(),
-                    found: accessor.count(),
-                    expected: positions.len(),
-                });
+            Some(accessor) => {
+                same_count(accessor.count(), "COLOR_0")?;
+                first_numbers::<3>(&accessor, &self.buffers)?
             }
-            Some(accessor) => first_numbers::<3>(&accessor, &self.buffers)?,
             None => vec![[1.0; 3]; positions.len()],
         };
-        same_count(colors.len(), "COLOR_0".to_owned())?;
         let material = primitive.material();
         let colors = colors_in_range(colors, primitive.index(), material.name().unwrap_or("default"))?;
         // Many tools write white for every vertex of a mesh that nobody painted.
@@ -306,7 +300,7 @@ impl Reader<'_> {
             let transform = info.texture_transform();
             let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
             let Some(accessor) = primitive.get(&Semantic::TexCoords(set)) else { continue };
-            same_count(accessor.count(), format!("TEXCOORD_{set}"))?;
+            same_count(accessor.count(), &format!("TEXCOORD_{set}"))?;
             let found = numbers::<2>(&accessor, &self.buffers)?;
             *uvs = found.into_iter().map(|uv| looked_up(Vec2::from(uv), transform.as_ref())).collect();
         }
@@ -328,13 +322,17 @@ impl Reader<'_> {
     }
 }
 
+fn invalid(why: impl Into<String>) -> ImportError {
+    ImportError::Invalid(why.into())
+}
+
 /// The numbers, clamped to 0 to 1. Fails where one is further outside than by rounding; `pointer` is its place in the
 /// file.
 fn in_range<const N: usize>(pointer: &str, material: &str, found: [f32; N]) -> Result<[f32; N], ImportError> {
     if found.iter().all(is_unit) {
         return Ok(found.map(|value| value.clamp(0.0, 1.0)));
     }
-    Err(ImportError::OutOfRange { key: pointer.to_owned(), material: material.to_owned(), found: found.to_vec() })
+    Err(out_of_range(pointer, material, &found))
 }
 
 /// Whether the number lies within 0 to 1, but for rounding; NaN does not.
@@ -369,7 +367,7 @@ fn looked_up(uv: Vec2, transform: Option<&gltf::texture::TextureTransform<'_>>) 
 fn wrap(sampler: &gltf::texture::Sampler<'_>) -> Result<Wrap, ImportError> {
     use gltf::texture::WrappingMode;
     if sampler.wrap_s() != sampler.wrap_t() {
-        return Err(ImportError::Unsupported(Unsupported::MixedWrap));
+        return Err(invalid("a sampler that wraps u and v in different ways is not read"));
     }
     Ok(match sampler.wrap_s() {
         WrappingMode::Repeat => Wrap::Repeat,
@@ -409,7 +407,8 @@ mod tests {
         let (mut bytes, key) = (sound(), br#","material":0"#);
         let at = bytes.windows(key.len()).position(|window| window == key).unwrap();
         bytes[at..at + key.len()].fill(b' ');
-        assert!(matches!(read_bytes(&bytes), Err(ImportError::NoBaseColor { glows: false, .. })));
+        let refused = read_bytes(&bytes).err().unwrap().to_string();
+        assert!(refused.contains("states a base colour, such as 'default': bake it to a texture"), "{refused}");
         // Twin: our own writer states everything.
         let donor = read_bytes(&sound()).unwrap();
         assert_eq!((donor.triangles.len(), donor.groups[0].names.as_slice()), (1, &["a".to_owned()][..]));
@@ -477,7 +476,8 @@ mod tests {
             let [r, g, b, ..] = donor.values(0, DVec3::splat(1.0 / 3.0));
             assert!(Vec3::new(r, g, b).abs_diff_eq(Vec3::new(0.5, 0.25, 1.0), 1e-5), "{r} {g} {b}");
             // Twin: white at every vertex states nothing.
-            assert!(matches!(read_triangle(material, Some([1.0; 3])), Err(ImportError::NoBaseColor { .. })));
+            let refused = read_triangle(material, Some([1.0; 3])).err().unwrap().to_string();
+            assert!(refused.contains("no material states a base colour"), "{refused}");
         }
     }
 

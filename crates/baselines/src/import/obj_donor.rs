@@ -8,25 +8,28 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use mateval_dataset::obj::{self, Materials, ObjLimits, ObjMaterial};
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texture, Wrap};
 
-use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
-use super::error::{ImportError, Limited, MAX_TEXELS, MAX_TRIANGLES, Place, Unsupported};
+use super::donor::{
+    Donor, DonorGroup, DonorMaterial, DonorTriangle, ImportError, MAX_TRIANGLES, Scalar, count_texels, out_of_range,
+    shift_near,
+};
 
 /// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
 pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor, ImportError> {
     let bytes = folder.read(name)?;
     let limits = ObjLimits { triangles: MAX_TRIANGLES, corners: 3 * MAX_TRIANGLES };
-    let read = obj::read(&bytes, limits, Materials::Split).map_err(|fault| ImportError::Obj { file: None, fault })?;
+    let read = obj::read(&bytes, limits, Materials::Split).map_err(|fault| ImportError::Invalid(fault.to_string()))?;
     let offset = read.base - shift_near(read.base, shift);
     let mut reader = Reader { folder, beside: name.rsplit_once('/').map_or("", |(beside, _)| beside), texels: 0 };
     let mut known = BTreeMap::new();
     for file in obj::material_files(&bytes) {
         let bytes = reader.material_file(&file)?;
-        let materials =
-            obj::read_materials(&bytes).map_err(|fault| ImportError::Obj { file: Some(file.clone()), fault })?;
+        let in_file = |fault| ImportError::Invalid(format!("'{}': {fault}", shortened(&file)));
+        let materials = obj::read_materials(&bytes).map_err(in_file)?;
         known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));
     }
     let (mut donor, mut numbers, mut first) = (Donor::default(), BTreeMap::new(), 0);
@@ -39,8 +42,7 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
         let material = match (numbers.get(&key), described) {
             (Some(number), _) => *number,
             (None, None) if !is_painted => {
-                let (group, material) = (group.name.clone(), group.material.clone().unwrap_or_default());
-                return Err(ImportError::UndefinedMaterial { group, material });
+                return Err(undefined_material(&group.name, group.material.as_deref()));
             }
             (None, described) => {
                 donor.materials.push(described.map_or_else(|| Ok(painted()), |described| reader.material(described))?);
@@ -51,7 +53,8 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
         for triangle in first..first + group.triangles {
             let corners = read.mesh.corners(triangle);
             if !corners.iter().all(|corner| corner.is_finite()) {
-                return Err(ImportError::NotFinite(Place::GroupCorner(group.name.clone())));
+                let name = shortened(&group.name);
+                return Err(ImportError::Invalid(format!("a corner of group '{name}' is not finite")));
             }
             let corners = corners.map(|corner| (corner.as_dvec3() + offset).as_vec3());
             let uv = |vertex: u32| read.mesh.uvs.as_ref().map_or(Vec2::NAN, |uvs| uvs[vertex as usize]);
@@ -64,8 +67,7 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
         first += group.triangles;
     }
     if let Some(bad) = read.colors.iter().find(|rgb| !rgb.iter().all(|v| (0.0..=1.0).contains(v))) {
-        let (key, material) = ("a vertex colour".to_owned(), "vertex colours".to_owned());
-        return Err(ImportError::OutOfRange { key, material, found: bad.to_vec() });
+        return Err(out_of_range("a vertex colour", "vertex colours", bad));
     }
     donor.use_means();
     donor.check_base_color()?;
@@ -82,6 +84,20 @@ fn painted() -> DonorMaterial {
         roughness: None,
         metallic: None,
     }
+}
+
+/// The error about a group whose material no MTL file defines, or that has none.
+fn undefined_material(group: &str, material: Option<&str>) -> ImportError {
+    let group = shortened(group);
+    ImportError::Invalid(match material {
+        None | Some("") => format!(
+            "group '{group}' has faces without `usemtl`; expected `usemtl` before them, with a material that an mtllib of \
+             the file defines, or a colour of every vertex (v x y z r g b)"
+        ),
+        Some(material) => {
+            format!("group '{group}' has the material '{}', which no mtllib of the file defines", shortened(material))
+        }
+    })
 }
 
 struct Reader<'a> {
@@ -118,8 +134,8 @@ impl Reader<'_> {
         let base_color = match &material.diffuse_map {
             Some(name) => ([1.0; 3], Some(self.texture(name, Encoding::Srgb)?)),
             None => {
-                let missing = || ImportError::MissingColor { material: material.name.clone() };
-                (material.diffuse.ok_or_else(missing)?, None)
+                let missing = || format!("material '{}' has neither map_Kd nor Kd", shortened(&material.name));
+                (material.diffuse.ok_or_else(|| ImportError::Invalid(missing()))?, None)
             }
         };
         let mut scalar = |factor: Option<f32>, map: &Option<String>| match map {
@@ -131,29 +147,29 @@ impl Reader<'_> {
         };
         let roughness = scalar(material.roughness, &material.roughness_map)?;
         let metallic = scalar(material.metallic, &material.metallic_map)?;
-        let (name, ranges) = (&material.name, [("Kd", material.diffuse), ("Pr", None), ("Pm", None)]);
-        let scalars = [None, material.roughness.map(|v| [v; 3]), material.metallic.map(|v| [v; 3])];
-        for ((key, color), scalar) in ranges.into_iter().zip(scalars) {
-            let found: Vec<f32> = color.map(Vec::from).or(scalar.map(|v| vec![v[0]])).unwrap_or_default();
+        let [diffuse, own_roughness, own_metallic] = [
+            material.diffuse.as_ref().map_or(&[][..], |rgb| rgb),
+            material.roughness.as_slice(),
+            material.metallic.as_slice(),
+        ];
+        for (key, found) in [("Kd", diffuse), ("Pr", own_roughness), ("Pm", own_metallic)] {
             if !found.iter().all(|v| (0.0..=1.0).contains(v)) {
-                return Err(ImportError::OutOfRange { key: key.to_owned(), material: name.clone(), found });
+                return Err(out_of_range(key, &material.name, found));
             }
         }
-        let name = name.clone();
+        let name = material.name.clone();
         Ok(DonorMaterial { name, states_base_color: true, glows: false, base_color, roughness, metallic })
     }
 
     fn texture(&mut self, name: &str, encoding: Encoding) -> Result<Texture, ImportError> {
         if name.starts_with('-') {
-            return Err(ImportError::Unsupported(Unsupported::TextureOptions(name.to_owned())));
+            let why = "options of a texture are not read; write the file name alone";
+            return Err(ImportError::Invalid(format!("'{}': {why}", shortened(name))));
         }
         let relative = self.relative(name)?;
         let bytes = self.folder.read(&relative)?;
         let read = texture_of_bytes(Path::new(&relative), bytes, encoding, Wrap::Repeat)?;
-        self.texels += read.width() * read.height();
-        if self.texels > MAX_TEXELS {
-            return Err(ImportError::TooLarge { what: Limited::Texels, limit: MAX_TEXELS as u64 });
-        }
+        count_texels(&mut self.texels, &read)?;
         Ok(read)
     }
 }
@@ -169,6 +185,12 @@ mod tests {
         std::fs::write(folder.path().join("a.obj"), format!("mtllib a.mtl\n{vertices}usemtl m\nf 1 2 3\n")).unwrap();
         std::fs::write(folder.path().join("a.mtl"), format!("newmtl m\n{material}\n")).unwrap();
         read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.obj", DVec3::ZERO).unwrap()
+    }
+
+    #[test]
+    fn a_missing_usemtl_is_named() {
+        assert!(undefined_material("g", None).to_string().contains("group 'g' has faces without `usemtl`"));
+        assert!(undefined_material("g", Some("red")).to_string().contains("the material 'red', which no mtllib"));
     }
 
     #[test]

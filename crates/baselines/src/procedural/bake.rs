@@ -6,7 +6,7 @@ use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_image::{Mask, Picture};
 use rayon::prelude::*;
 
-use super::materials::{PartMaterial, Residuals, SceneMaterials, completed};
+use super::materials::{SceneMaterials, completed};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
 use crate::geometry::{SceneGeometry, SeenPixels};
@@ -33,20 +33,22 @@ pub(super) fn bake_all(
     keep_seen: bool,
     mut each: impl FnMut(usize, Baked) -> Result<(), BaselineError>,
 ) -> Result<(), BaselineError> {
-    let (residuals, given) = (materials.residuals.as_deref(), materials.given);
-    let baker = Baker { of_part: &materials.of_part, residuals, given };
+    let given = materials.given;
     for (at, instance) in geometry.scene.instances.iter().enumerate() {
         let Some(atlas) = &instance.atlas else { continue };
+        let size = atlas.size as usize;
         let mut known = match keep_seen {
-            true => lift(geometry, seen, estimate, at, atlas.size as usize),
-            false => unknown(geometry.mesh(at), atlas.size as usize),
+            true => lift(geometry, seen, estimate, at, size),
+            false => {
+                let atlas = UvAtlas::new(geometry.mesh(at), size);
+                let unknown = |x, y| atlas.owner(x, y).map_or(Texel::Unused, |_| Texel::Unseen);
+                PartialAtlas { texels: Picture::from_fn(size, size, unknown), atlas }
+            }
         };
-        let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
-        known.texels = known.texels.map(|texel| match texel {
-            Texel::Seen(values) => Texel::Seen(completed(values, given)),
-            other => other,
-        });
-        baker.fill_unseen(geometry.mesh(at), materials.triangles.of(at), &mut known);
+        let seen = keep_seen.then(|| known.texels.map(|texel| texel.seen().is_some()));
+        known.texels =
+            known.texels.map(|texel| texel.seen().map_or(texel, |values| Texel::Seen(completed(values, given))));
+        materials.fill_unseen(geometry.mesh(at), materials.triangles.of(at), &mut known);
         // A graph has a roughness and a metallic of its own.
         let has_graph = materials.has_graph(at);
         let roughness = given.roughness || has_graph;
@@ -56,23 +58,7 @@ pub(super) fn bake_all(
     Ok(())
 }
 
-/// An atlas of which nothing is known.
-fn unknown(mesh: &TriangleMesh, size: usize) -> PartialAtlas {
-    let atlas = UvAtlas::new(mesh, size);
-    let texels =
-        Picture::from_fn(size, size, |x, y| if atlas.owner(x, y).is_some() { Texel::Unseen } else { Texel::Unused });
-    PartialAtlas { atlas, texels }
-}
-
-/// The materials of a scene, part by part, and the maps that its estimate gives.
-struct Baker<'a> {
-    of_part: &'a [PartMaterial],
-    /// What is added to each; none where materials stay as they are.
-    residuals: Option<&'a [Residuals]>,
-    given: GivenMaps,
-}
-
-impl Baker<'_> {
+impl SceneMaterials<'_> {
     /// Gives all texels that are `Unseen` the material of their part. `parts` holds the part of each of the mesh's
     /// triangles. Texels of no part stay as they are.
     fn fill_unseen(&self, mesh: &TriangleMesh, parts: &[Option<usize>], known: &mut PartialAtlas) {
@@ -113,7 +99,7 @@ impl Baker<'_> {
             }
             _ => vec![material.values; texels.len()],
         };
-        if let Some(residuals) = self.residuals.map(|all| &all[part]) {
+        if let Some(residuals) = self.residuals.as_ref().map(|all| &all[part]) {
             for (values, position) in values.iter_mut().zip(positions) {
                 let residual = residuals.at(position);
                 values.iter_mut().zip(residual).for_each(|(value, more)| *value = (*value + more).clamp(0.0, 1.0));

@@ -25,6 +25,7 @@ use mateval_procedural::value::Type;
 use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
+use serde::Serialize;
 
 use super::part_frame::{Chart, PartFrame};
 use super::part_samples::{PartSamples, Sample};
@@ -62,7 +63,10 @@ pub struct ProceduralOptions {
 impl ProceduralOptions {
     /// Fails unless `detail` is 0 to 1.
     pub fn check(&self) -> Result<(), BaselineError> {
-        if (0.0..=1.0).contains(&self.detail) { Ok(()) } else { Err(BaselineError::Detail(self.detail)) }
+        match self.detail {
+            0.0..=1.0 => Ok(()),
+            detail => Err(BaselineError::Unusable(format!("the detail is {detail}; expected 0 to 1"))),
+        }
     }
 }
 
@@ -94,10 +98,8 @@ impl<'a> SceneMaterials<'a> {
         progress: Progress<'_>,
     ) -> Result<Self, BaselineError> {
         options.check()?;
+        estimate.needs_color(&geometry.scene.id)?;
         let given = estimate.given_maps();
-        if !given.base_color {
-            return Err(BaselineError::NoColor(geometry.scene.id.to_string()));
-        }
         let set = options.part_set.as_ref();
         let triangles = PartTriangles::read(geometry, set)?;
         let samples_of_parts = PartSamples::of_parts(geometry, set, &triangles, estimate, seen)?;
@@ -150,15 +152,16 @@ const LEAST_OF_PATTERN: f64 = 0.05;
 const LEAST_OF_TEXTURE: f64 = 0.1;
 
 /// What decided on a part's material.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub(super) enum Reason {
     /// No pixel shows it: it has the colour of its instance, or of its category.
     Unseen,
     /// Too few pixels of one side show it: it has the median of its pixels.
     FewPixels,
     /// No graph is better than one colour: it has the median of its pixels.
-    OneColor(Fit),
-    Graph(Fit),
+    OneColor,
+    Graph,
 }
 
 #[derive(Clone, Debug)]
@@ -171,6 +174,8 @@ pub(super) struct PartMaterial {
     pub(super) chart: Option<Chart>,
     pub(super) frame: Option<PartFrame>,
     pub(super) reason: Reason,
+    /// None for a part that too few pixels show.
+    pub(super) fit: Option<Fit>,
     /// The number of pixels that show the part.
     pub(super) pixels: usize,
 }
@@ -188,7 +193,8 @@ impl PartMaterial {
         let pixels = part.shown.len();
         let values = if pixels == 0 { unseen } else { median(&mut part.shown.clone()) };
         let values = completed(values, given);
-        let flat = Self { values, graph: None, chart: None, frame: part.frame, reason: Reason::Unseen, pixels };
+        let (frame, reason) = (part.frame, Reason::Unseen);
+        let flat = Self { values, graph: None, chart: None, frame, reason, fit: None, pixels };
         if pixels == 0 {
             return Ok(flat);
         }
@@ -207,9 +213,10 @@ impl PartMaterial {
             FitMode::Paper => Some(&fit.chosen).filter(|chosen| !is_flat(chosen)),
         };
         let Some(graph) = accepted.map(|accepted| accepted.with_detail(options.detail)) else {
-            return Ok(Self { chart, reason: Reason::OneColor(fit), ..flat });
+            return Ok(Self { chart, reason: Reason::OneColor, fit: Some(fit), ..flat });
         };
-        Ok(Self { graph: Some(with_median_of(graph, &points)), chart, reason: Reason::Graph(fit), ..flat })
+        let graph = Some(with_median_of(graph, &points));
+        Ok(Self { graph, chart, reason: Reason::Graph, fit: Some(fit), ..flat })
     }
 
     /// The material at places of the unfolded box, `[u, v, footprint]` in metres. Roughness and metallic are those of
@@ -229,14 +236,6 @@ impl PartMaterial {
             [color[0], color[1], color[2], roughness, metallic]
         };
         graph.evaluate(places).into_iter().map(of_outputs).collect()
-    }
-
-    /// The fit; none for a part that too few pixels show.
-    pub(super) fn fit(&self) -> Option<&Fit> {
-        match &self.reason {
-            Reason::OneColor(fit) | Reason::Graph(fit) => Some(fit),
-            Reason::Unseen | Reason::FewPixels => None,
-        }
     }
 }
 

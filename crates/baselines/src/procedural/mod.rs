@@ -26,7 +26,7 @@ use mateval_image::png_io;
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
 use mateval_procedural::library::entry;
-use mateval_procedural::mtlx::{Limits, read_file};
+use mateval_procedural::mtlx::read_file;
 
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
@@ -38,9 +38,7 @@ pub use bake::Baked;
 use bake::bake_all;
 use materials::SceneMaterials;
 pub use materials::{FitMode, ProceduralOptions};
-use report::{
-    REPORT, REPORT_FORMAT, ReportFile, SceneReport, ShownScene, html, library_sha256, write_graphs, write_pictures,
-};
+use report::{REPORT, REPORT_FORMAT, ReportFile, SceneReport, html, library_sha256, write_graphs, write_pictures};
 
 /// The folder of a submission's report: beside it, with `.report` at the end of its name.
 pub fn report_folder(submission: &Path) -> PathBuf {
@@ -64,7 +62,8 @@ pub fn write(
     submission::check_out(dataset, out, force)?;
     check_free(&report, force, "--out")?;
     if report.exists() && !report.join(REPORT).exists() {
-        return Err(BaselineError::NotAReport(report));
+        let why = "exists and holds no report.json, so it is not replaced; remove it, or choose another --out";
+        return Err(BaselineError::unusable(&report, why));
     }
     let fitter = fitter(options)?;
     let work = WorkFolder::start(&report)?;
@@ -88,7 +87,7 @@ pub fn write(
         let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
         let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;
         let has_photo = write_pictures(&place, photo.as_ref(), &estimate, &materials)?;
-        scenes.push(ShownScene { report: SceneReport::new(scene, &materials), has_photo });
+        scenes.push((SceneReport::new(scene, &materials), has_photo));
         Ok(count)
     })?;
     let index = work.path().join("index.html");
@@ -98,7 +97,7 @@ pub fn write(
         method: method.name,
         description: method.description,
         library_sha256: library_sha256(),
-        scenes: scenes.into_iter().map(|scene| scene.report).collect(),
+        scenes: scenes.into_iter().map(|(report, _)| report).collect(),
     };
     json::write(&work.path().join(REPORT), &file)?;
     work.finish()?;
@@ -166,17 +165,19 @@ fn read(folder: &Path) -> Result<Vec<Graph>, BaselineError> {
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "mtlx"));
     paths.sort();
     if paths.is_empty() || paths.len() > MOST_FILES {
-        return Err(BaselineError::GraphCount { folder: folder.to_owned(), found: paths.len(), most: MOST_FILES });
+        let why = format!("holds {} .mtlx files; expected 1 to {MOST_FILES}", paths.len());
+        return Err(BaselineError::unusable(folder, why));
     }
-    let (mut graphs, mut faults): (Vec<Graph>, _) = (Vec::new(), Vec::new());
+    let (mut graphs, mut faults): (Vec<Graph>, Vec<String>) = (Vec::new(), Vec::new());
     for path in &paths {
-        match read_file(path, &Limits::default()) {
+        match read_file(path) {
             Ok(graph) if entry(&graph.name).is_some() || graphs.iter().any(|other| other.name == graph.name) => {
-                return Err(BaselineError::SameGraph { path: path.clone(), name: graph.name });
+                let why = "which is built in or in another file of its folder; give it another name";
+                return Err(BaselineError::unusable(path, format!("has the graph '{}', {why}", graph.name)));
             }
             Ok(graph) => graphs.push(graph),
-            Err(fault) => faults.push(fault),
+            Err(fault) => faults.push(fault.to_string()),
         }
     }
-    if faults.is_empty() { Ok(graphs) } else { Err(BaselineError::BadGraphs(faults)) }
+    if faults.is_empty() { Ok(graphs) } else { Err(BaselineError::Unusable(faults.join("\n"))) }
 }

@@ -55,8 +55,7 @@ impl PartSamples {
         let corners = corners_of_parts(geometry, triangles);
         let frames = corners.iter().map(|corners| PartFrame::new(corners, viewer, origin));
         let mut parts: Vec<Self> = frames.map(|frame| Self { frame, shown: Vec::new(), samples: Vec::new() }).collect();
-        let place_of: BTreeMap<u16, usize> =
-            triangles.parts.iter().enumerate().map(|(at, part)| (part.index.0.get(), at)).collect();
+        let place_of = triangles.place_of_index();
         for point in seen.points(geometry) {
             let (x, y) = seen.view_pixel(point.pixel.0, point.pixel.1);
             let Some(&at) = place_of.get(&picture.get(x, y)) else { continue };

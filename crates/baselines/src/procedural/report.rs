@@ -24,10 +24,8 @@ use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Placement};
 use crate::submission::Method;
 
-/// The name of the file.
 pub(super) const REPORT: &str = "report.json";
 
-/// The format's name and version.
 pub(super) const REPORT_FORMAT: &str = "mateval-procedural/1";
 
 #[derive(Serialize)]
@@ -54,7 +52,7 @@ struct PartReport {
     instance: String,
     /// The number of pixels that show it.
     pixels: usize,
-    reason: ReasonWord,
+    reason: Reason,
     /// The side of its box that was fitted.
     side: Option<Chart>,
     /// Median base colour (linear), roughness and metallic of its pixels, or what stands for them.
@@ -63,20 +61,9 @@ struct PartReport {
     /// The error of one colour at the same held-out pixels.
     error_of_one_color: Option<f64>,
     /// The other graphs, in the order of the fit's own score.
-    others: Vec<OtherReport>,
+    others: Vec<GraphReport>,
 }
 
-/// What decided on a part's material.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum ReasonWord {
-    Unseen,
-    FewPixels,
-    OneColor,
-    Graph,
-}
-
-/// A graph with the numbers of its parameters.
 #[derive(Serialize)]
 struct GraphReport {
     graph: String,
@@ -85,16 +72,9 @@ struct GraphReport {
     error: f64,
     /// How far its statistics are from those of the pixels.
     distance: f64,
+    /// Of the chosen graph alone.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, Vec<f64>>,
-}
-
-/// A graph that was not chosen.
-#[derive(Serialize)]
-struct OtherReport {
-    graph: String,
-    class: Option<Class>,
-    error: f64,
-    distance: f64,
 }
 
 /// How many of the graphs that were not chosen are reported.
@@ -116,53 +96,38 @@ impl SceneReport {
 
 impl PartReport {
     /// The best graph that was not taken and is more than one colour.
-    fn runner_up(&self) -> Option<&OtherReport> {
+    fn runner_up(&self) -> Option<&GraphReport> {
         self.others.iter().find(|other| other.class != Some(Class::Flat))
     }
 
     fn new(part: String, instance: String, material: &PartMaterial) -> Self {
-        let reason = match &material.reason {
-            Reason::Unseen => ReasonWord::Unseen,
-            Reason::FewPixels => ReasonWord::FewPixels,
-            Reason::OneColor(_) => ReasonWord::OneColor,
-            Reason::Graph(_) => ReasonWord::Graph,
-        };
-        let fit = material.fit();
-        let all = || fit.into_iter().flat_map(|fit| std::iter::once(&fit.chosen).chain(&fit.others));
+        let all = || material.fit.iter().flat_map(|fit| std::iter::once(&fit.chosen).chain(&fit.others));
         let taken = material.graph.as_ref().map(|graph| graph.graph.name.as_str());
         let others = all().filter(|found| Some(found.graph.name.as_str()) != taken);
-        let other = |other: &Candidate| OtherReport {
-            graph: other.graph.name.clone(),
-            class: other.class,
-            error: other.error,
-            distance: other.distance,
-        };
         Self {
             part,
             instance,
             pixels: material.pixels,
-            reason,
+            reason: material.reason,
             side: material.chart,
             values: material.values,
-            chosen: material.graph.as_ref().map(GraphReport::new),
+            chosen: material.graph.as_ref().map(|graph| GraphReport { parameters: parameters(graph), ..graph.into() }),
             error_of_one_color: all().find(|found| found.class == Some(Class::Flat)).map(|found| found.error),
-            others: others.take(MOST_OTHERS).map(other).collect(),
+            others: others.take(MOST_OTHERS).map(GraphReport::from).collect(),
         }
     }
 }
 
-impl GraphReport {
-    fn new(found: &Candidate) -> Self {
-        let baked = found.settings.as_defaults(&found.graph, &found.graph.name);
-        let parameters = baked.parameters.iter().map(|p| (p.name.clone(), p.value.numbers().to_vec()));
-        Self {
-            graph: found.graph.name.clone(),
-            class: found.class,
-            error: found.error,
-            distance: found.distance,
-            parameters: parameters.collect(),
-        }
+impl From<&Candidate> for GraphReport {
+    fn from(found: &Candidate) -> Self {
+        let Candidate { class, error, distance, .. } = *found;
+        Self { graph: found.graph.name.clone(), class, error, distance, parameters: BTreeMap::new() }
     }
+}
+
+fn parameters(found: &Candidate) -> BTreeMap<String, Vec<f64>> {
+    let baked = found.settings.as_defaults(&found.graph, &found.graph.name);
+    baked.parameters.iter().map(|p| (p.name.clone(), p.value.numbers().to_vec())).collect()
 }
 
 /// A hash of the built-in graphs, on which the results depend.
@@ -238,7 +203,7 @@ pub(super) fn write_pictures(
     }
     let parts = materials.triangles.parts.iter().zip(&materials.samples);
     for ((part, samples), material) in parts.zip(&materials.of_part) {
-        if material.fit().is_none() {
+        if material.fit.is_none() {
             continue;
         }
         for (name, picture) in &all {
@@ -299,14 +264,8 @@ fn swatch(part: &PartSamples, material: &PartMaterial, given: GivenMaps) -> Opti
     )
 }
 
-/// A scene on the page.
-pub(super) struct ShownScene {
-    pub(super) report: SceneReport,
-    pub(super) has_photo: bool,
-}
-
-/// The page. Ids and names of graphs contain no characters that are special in HTML, save those of a user's files.
-pub(super) fn html(method: &Method, scenes: &[ShownScene]) -> String {
+/// The page of the scenes, each with whether it has a photo. Ids and names of graphs contain no characters that are special in HTML, save those of a user's files.
+pub(super) fn html(method: &Method, scenes: &[(SceneReport, bool)]) -> String {
     let introduction = format!(
         "<strong>{}</strong>: {}. Parts are sorted by the number of pixels that show them. Errors are mean squares of \
          differences of linear colours at pixels that took no part in the fit.",
@@ -316,25 +275,25 @@ pub(super) fn html(method: &Method, scenes: &[ShownScene]) -> String {
     plain("Procedural materials", &introduction, &scenes.iter().map(section).collect::<String>(), "")
 }
 
-fn section(scene: &ShownScene) -> String {
-    let id = &scene.report.id;
+fn section((scene, has_photo): &(SceneReport, bool)) -> String {
+    let id = &scene.id;
     let mut text = format!("<section><h2>{id}</h2><div class=\"row\">\n");
-    for (name, caption) in pictures(scene.has_photo) {
+    for (name, caption) in pictures(*has_photo) {
         text.push_str(&figure(&format!("{id}/{name}.png"), id, caption));
     }
     text.push_str("</div>\n");
-    let mut parts: Vec<&PartReport> = scene.report.parts.iter().collect();
+    let mut parts: Vec<&PartReport> = scene.parts.iter().collect();
     parts.sort_by(|a, b| b.pixels.cmp(&a.pixels).then(a.part.cmp(&b.part)));
-    let count = |reason: ReasonWord| parts.iter().filter(|part| part.reason == reason).count();
-    let (graphs, colors) = (count(ReasonWord::Graph), count(ReasonWord::OneColor));
-    let (few, unseen) = (count(ReasonWord::FewPixels), count(ReasonWord::Unseen));
+    let count = |reason: Reason| parts.iter().filter(|part| part.reason == reason).count();
+    let (graphs, colors) = (count(Reason::Graph), count(Reason::OneColor));
+    let (few, unseen) = (count(Reason::FewPixels), count(Reason::Unseen));
     writeln!(
         text,
         "<p>Parts with a graph: {graphs}; of one colour: {colors}; with too few pixels: {few}; not seen: {unseen}. The \
          graphs with their parameters: <a href=\"{id}/materials.mtlx\">materials.mtlx</a></p>"
     )
     .expect("writing to a String cannot fail");
-    text.extend(parts.iter().filter(|part| part.chosen.is_some()).map(|part| with_graph(scene, part)));
+    text.extend(parts.iter().filter_map(|part| Some(with_graph(id, *has_photo, part, part.chosen.as_ref()?))));
     text.push_str(&table(&parts));
     text.push_str("</section>\n");
     text
@@ -346,11 +305,10 @@ fn pictures(has_photo: bool) -> Vec<(&'static str, &'static str)> {
 }
 
 /// A part with its pictures and parameters.
-fn with_graph(scene: &ShownScene, part: &PartReport) -> String {
-    let (id, name) = (&scene.report.id, &part.part);
-    let Some(chosen) = &part.chosen else { return String::new() };
+fn with_graph(id: &str, has_photo: bool, part: &PartReport, chosen: &GraphReport) -> String {
+    let name = &part.part;
     let mut text = format!("<h3>{name}: {}</h3><div class=\"row\">\n", escaped(&chosen.graph));
-    for (picture, caption) in pictures(scene.has_photo).into_iter().chain([("swatch", "The graph from the front")]) {
+    for (picture, caption) in pictures(has_photo).into_iter().chain([("swatch", "The graph from the front")]) {
         text.push_str(&figure(&format!("{id}/{name}-{picture}.png"), name, caption));
     }
     text.push_str("</div><p>");
@@ -388,7 +346,7 @@ fn table(parts: &[&PartReport]) -> String {
     for part in parts.iter().filter(|part| part.pixels > 0) {
         let material = match (&part.chosen, part.reason) {
             (Some(chosen), _) => escaped(&chosen.graph),
-            (None, ReasonWord::FewPixels) => "one colour: few pixels".to_owned(),
+            (None, Reason::FewPixels) => "one colour: few pixels".to_owned(),
             (None, _) => "one colour".to_owned(),
         };
         let runner_up = part.runner_up().map_or("-".to_owned(), |other| escaped(&other.graph));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use mateval_baselines::homogeneous;
+use mateval_baselines::bounds;
 use mateval_dataset::json;
 use mateval_dataset::open::Dataset;
 use mateval_eval::protocol::Protocol;
@@ -27,7 +27,7 @@ struct Scored {
 static SCORED: LazyLock<Scored> = LazyLock::new(|| {
     let dataset = Dataset::open(&built()).unwrap();
     let submission = kept_folder("verify").join("grey");
-    homogeneous::write_grey(&dataset, &submission, false).unwrap();
+    bounds::write_grey(&dataset, &submission, false).unwrap();
     let protocols = vec![Protocol::named("mateval-3").unwrap()];
     let plan = ScorePlan::new(&dataset, vec![&submission], protocols, missing(), "test");
     let result = score(&plan, &|_| ()).unwrap().remove(0);
@@ -128,7 +128,7 @@ fn a_result_of_another_version_is_named_as_such() {
 fn another_texel_is_found() {
     let changed = tempfile::tempdir().unwrap();
     let submission = changed.path().join("grey");
-    homogeneous::write_grey(&SCORED.dataset, &submission, false).unwrap();
+    bounds::write_grey(&SCORED.dataset, &submission, false).unwrap();
     // The twin: a copy is the same submission.
     assert!(verified(&SCORED.result, &submission).confirmed);
     let scene = submission.join("scenes/room");

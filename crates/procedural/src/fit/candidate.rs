@@ -8,11 +8,10 @@ use std::sync::Arc;
 use super::Point;
 use super::least_squares::mean_square;
 use super::model::{Model, Role, is_length, role};
-use crate::evaluator::{Evaluator, Points};
+use crate::evaluator::evaluate;
 use crate::graph::{Graph, Settings, slots};
 use crate::library::Class;
 use crate::noise::cell;
-use crate::program::op::LANES;
 use crate::program::{OUTPUTS, Program};
 
 /// The number of places at which the mean colour of a pattern is measured.
@@ -77,15 +76,7 @@ impl Candidate {
 
     /// Base colour (linear red, green, blue), roughness and metallic at places `[u, v, footprint]`, all in metres.
     pub fn evaluate(&self, places: &[[f64; 3]]) -> Vec<[f64; OUTPUTS]> {
-        let program = Program::new(&self.graph);
-        let mut evaluator = Evaluator::new(&program, &self.settings, &[]);
-        let mut all = Vec::with_capacity(places.len());
-        for batch in places.chunks(LANES) {
-            let at = |axis: usize| std::array::from_fn(|lane| batch[lane.min(batch.len() - 1)][axis]);
-            evaluator.run(&Points { u: at(0), v: at(1), footprint: at(2) });
-            all.extend((0..batch.len()).map(|lane| evaluator.outputs(lane)));
-        }
-        all
+        evaluate(&Program::new(&self.graph), &self.settings, places)
     }
 
     /// The mean colour over a large square.

@@ -164,14 +164,9 @@ pub(super) fn cell_error(model: &Model, settings: &Settings, points: &[Point]) -
 pub(super) fn excess(model: &Model, settings: &Settings, points: &[Point]) -> f64 {
     let Some(own) = cell_error(model, settings, points) else { return 0.0 };
     let elsewhere = ELSEWHERE.iter().filter_map(|moves| {
-        let mut moved = settings.clone();
-        for (name, add) in ["theta", "t_u", "t_v"].iter().zip(moves) {
-            if let Some(at) = model.slot(name) {
-                let number = moved.numbers()[at] + add;
-                model.set(&mut moved, name, number);
-            }
-        }
-        cell_error(model, &moved, points)
+        let moved =
+            ["theta", "t_u", "t_v"].iter().zip(moves).map(|(name, add)| (*name, model.number(settings, name) + add));
+        cell_error(model, &model.with(settings, &moved.collect::<Vec<_>>()), points)
     });
     let logs: Vec<f64> = elsewhere.map(|error| libm::log(error.max(1e-12))).collect();
     let mean = logs.iter().sum::<f64>() / logs.len().max(1) as f64;
@@ -207,9 +202,8 @@ struct InRow {
 /// The number of each point's board, and the price of having chosen where the rows begin: the logarithm of the number
 /// of ways. `sizes` are the slots of the width and the length of a board.
 fn boards(model: &Model, settings: &Settings, [width, length]: [usize; 2], points: &[Point]) -> (Vec<i64>, f64) {
-    let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
-    let (sin, cos) = libm::sincos(number("theta").to_radians());
-    let (t_u, t_v) = (number("t_u"), number("t_v"));
+    let [theta, t_u, t_v] = ["theta", "t_u", "t_v"].map(|name| model.number(settings, name));
+    let (sin, cos) = libm::sincos(theta.to_radians());
     let [width, length] = [width, length].map(|at| settings.numbers()[at].max(1e-9));
     let in_row = |(at, point): (usize, &Point)| {
         let (u, v) = (point.u - t_u, point.v - t_v);
@@ -309,7 +303,7 @@ impl Frame {
 
     /// The settings after a change by a step in metres, of points at the reach.
     fn moved(&self, model: &Model, settings: &Settings, change: Move, step: f64) -> Settings {
-        let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
+        let number = |name: &str| model.number(settings, name);
         let mut moved = settings.clone();
         // The middle in the frame of the pattern.
         let (sin, cos) = libm::sincos(number("theta").to_radians());
@@ -326,8 +320,7 @@ impl Frame {
                 }
             }
         }
-        let turn = model.slot("theta").map_or(0.0, |at| moved.numbers()[at]);
-        let (sin, cos) = libm::sincos(turn.to_radians());
+        let (sin, cos) = libm::sincos(model.number(&moved, "theta").to_radians());
         model.set(&mut moved, "t_u", self.middle[0] - (place[0] * cos - place[1] * sin));
         model.set(&mut moved, "t_v", self.middle[1] - (place[0] * sin + place[1] * cos));
         moved
@@ -349,17 +342,22 @@ pub(super) fn better(model: &Model, layout: Layout, settings: &Settings, points:
             let mut along = resized(model, settings, u, 0.0);
             if let Some(shift) = shift {
                 along = along.into_iter().flat_map(|resized| same_rows(model, settings, resized, [u, shift])).collect();
-                along.extend(reshifted(model, settings, shift));
+                // Shifts add up, so that they have to be close.
+                along.extend((0..SHIFTS).map(|at| model.with(settings, &[(shift, f64::from(at) / f64::from(SHIFTS))])));
             }
             along.extend(resized(model, settings, v, 90.0));
             along
         }
         Layout::Rows { width, length, .. } => {
             let mut all = resized(model, settings, width, 90.0);
-            all.extend(lengthened(model, settings, length));
+            // No wave says anything about the length of boards.
+            let now = model.number(settings, length);
+            all.extend((-12..=8).map(|k| model.with(settings, &[(length, now * libm::exp(0.1 * f64::from(k)))])));
             all
         }
-        Layout::Similar { whole: Some((name, least, most)), .. } => numbered(model, settings, name, least..=most),
+        Layout::Similar { whole: Some((name, least, most)), .. } => {
+            (least..=most).map(|number| model.with(settings, &[(name, f64::from(number))])).collect()
+        }
         Layout::Similar { whole: None, .. } => return None,
     };
     all.retain(|tried| tried != settings);
@@ -368,67 +366,29 @@ pub(super) fn better(model: &Model, layout: Layout, settings: &Settings, points:
     (error < before).then_some(best)
 }
 
-/// The settings with other lengths of boards, about which no wave says anything.
-fn lengthened(model: &Model, settings: &Settings, length: &str) -> Vec<Settings> {
-    let Some(at) = model.slot(length) else { return Vec::new() };
-    let with_length = |step: i32| {
-        let mut lengthened = settings.clone();
-        model.set(&mut lengthened, length, settings.numbers()[at] * libm::exp(0.1 * f64::from(step)));
-        lengthened
-    };
-    (-12..=8).map(with_length).collect()
-}
-
-/// The settings with every value of a whole number.
-fn numbered(model: &Model, settings: &Settings, name: &str, range: std::ops::RangeInclusive<i32>) -> Vec<Settings> {
-    let with_number = |number: i32| {
-        let mut numbered = settings.clone();
-        model.set(&mut numbered, name, f64::from(number));
-        numbered
-    };
-    range.map(with_number).collect()
-}
-
-/// The settings with all shifts from row to row. Shifts add up, so that they have to be close.
-fn reshifted(model: &Model, settings: &Settings, shift: &str) -> Vec<Settings> {
-    let shifted = |at: u32| {
-        let mut shifted = settings.clone();
-        model.set(&mut shifted, shift, f64::from(at) / f64::from(SHIFTS));
-        shifted
-    };
-    (0..SHIFTS).map(shifted).collect()
-}
-
 /// Settings of another length with the shifts from row to row that leave every row where it was: up to one of the
 /// former lengths.
 fn same_rows(model: &Model, before: &Settings, resized: Settings, [length, shift]: [&str; 2]) -> Vec<Settings> {
-    let (Some(length_at), Some(shift_at)) = (model.slot(length), model.slot(shift)) else { return Vec::new() };
-    let factor = resized.numbers()[length_at] / before.numbers()[length_at].max(1e-12);
+    let factor = model.number(&resized, length) / model.number(before, length).max(1e-12);
     let with_shift = |lengths: u32| {
-        let share = (before.numbers()[shift_at] + f64::from(lengths)) / factor.max(1e-12);
-        let mut shifted = resized.clone();
-        model.set(&mut shifted, shift, share - share.floor());
-        shifted
+        let share = (model.number(before, shift) + f64::from(lengths)) / factor.max(1e-12);
+        model.with(&resized, &[(shift, share - share.floor())])
     };
     (0..factor.ceil().clamp(1.0, 3.0) as u32).map(with_shift).collect()
 }
 
 /// The settings with other sizes along an axis, which is at an angle in degrees to the pattern's first.
 fn resized(model: &Model, settings: &Settings, name: &str, turn: f64) -> Vec<Settings> {
-    let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
-    let (sin, cos) = libm::sincos((number("theta") + turn).to_radians());
-    let mut all = Vec::new();
-    for (factor, places) in FACTORS {
-        for place in 0..places {
-            let along = f64::from(place) * number(name) * factor / f64::from(places);
-            let mut resized = settings.clone();
-            model.set(&mut resized, name, number(name) * factor);
-            model.set(&mut resized, "t_u", number("t_u") + along * cos);
-            model.set(&mut resized, "t_v", number("t_v") + along * sin);
-            all.push(resized);
-        }
-    }
-    all
+    let [theta, t_u, t_v, size] = ["theta", "t_u", "t_v", name].map(|name| model.number(settings, name));
+    let (sin, cos) = libm::sincos((theta + turn).to_radians());
+    let resized = |factor: f64, place: u32, places: u32| {
+        let along = f64::from(place) * size * factor / f64::from(places);
+        model.with(settings, &[(name, size * factor), ("t_u", t_u + along * cos), ("t_v", t_v + along * sin)])
+    };
+    let all = FACTORS.into_iter();
+    all.flat_map(|(factor, places)| (0..places).map(move |place| (factor, place, places)))
+        .map(|(factor, place, places)| resized(factor, place, places))
+        .collect()
 }
 
 #[cfg(test)]

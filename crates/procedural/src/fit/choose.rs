@@ -18,8 +18,8 @@ use super::least_squares::{flattened, mean_square, polish, project};
 use super::model::{Model, Role, layout};
 use super::starts::{Pattern, Start, starts};
 use super::texture::{Colors, Sight, Texture};
-use super::waves::{Wave, lines, waves};
-use super::{Point, split, thinned};
+use super::waves::{Order, Wave, waves};
+use super::{Point, sound, split, thinned};
 use crate::error::ProceduralError;
 use crate::graph::{Graph, Settings};
 use crate::library::{Class, LIBRARY, entry};
@@ -145,10 +145,7 @@ impl Fitter {
     /// Fits the graphs to points, of which unsound ones are left out. The category, such as `floor` or `sofa`, makes
     /// some graphs more likely; unknown ones change nothing. Fails where no point is sound.
     pub fn fit(&self, points: &[Point], category: Option<&str>) -> Result<Fit, ProceduralError> {
-        let sound: Vec<Point> = points.iter().filter(|point| point.is_sound()).copied().collect();
-        if sound.is_empty() {
-            return Err(ProceduralError::NoPoints);
-        }
+        let sound = sound(points)?;
         let sound = flattened(&sound);
         let (seen, held_out) = split(&sound);
         // Too few points to hold some out: only the single colour is fitted, to all of them.
@@ -202,9 +199,9 @@ impl Fitter {
     /// The patterns whose best start is most promising, with their starts.
     fn begun(&self, seen: &[Point]) -> Vec<(&Pattern, Vec<Start>)> {
         let few = thinned(seen, 4096);
-        let strong = waves(&few, 8);
+        let strong = waves(&few, 8, Order::Power);
         // The joints of cells stand out against waves of similar period, not by their power.
-        let sharp = lines(&few, 8);
+        let sharp = waves(&few, 8, Order::Contrast);
         let both = [strong.as_slice(), &sharp];
         let of = |pattern: &Pattern| if pattern.model.tone.is_some() { &both } else { &both[..1] };
         let fewer = thinned(seen, 700);

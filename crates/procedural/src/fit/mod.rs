@@ -6,7 +6,7 @@
 //! wanted.
 //!
 //! 1. Shading that is left is taken away, and a quarter of the points is held out.
-//! 2. Periodic graphs: the strongest waves of the colours ([`waves`]), and those that stand out against waves of similar
+//! 2. Periodic graphs: the strongest waves of the colours (`waves`), and those that stand out against waves of similar
 //!    period, suggest turns, periods and shifts. Those whose waves agree best are judged by colours, which are a linear
 //!    least squares problem. Cells such as tiles have random tones, and rows of boards begin anywhere. The most
 //!    promising patterns are searched for the place of their cells and polished by Levenberg-Marquardt steps; sizes are
@@ -28,8 +28,9 @@ pub mod paper;
 mod starts;
 mod statistics;
 mod texture;
-pub mod waves;
+mod waves;
 
+use crate::error::ProceduralError;
 use crate::noise::cell;
 
 /// A place of a part.
@@ -72,6 +73,16 @@ const BLOCK: f64 = 16.0;
 pub fn split(points: &[Point]) -> (Vec<Point>, Vec<Point>) {
     let side = BLOCK * median(points.iter().map(|point| point.footprint).collect());
     points.iter().partition(|point| cell(point.u / side, point.v / side) >= HELD_OUT)
+}
+
+/// The points that can be used. Fails where there are none.
+fn sound(points: &[Point]) -> Result<Vec<Point>, ProceduralError> {
+    let sound: Vec<Point> = points.iter().filter(|point| point.is_sound()).copied().collect();
+    let expected = "points with finite places, colours from 0 up, and footprints and weights above 0";
+    match sound.is_empty() {
+        true => Err(ProceduralError::Unusable(format!("cannot fit a graph: expected {expected}"))),
+        false => Ok(sound),
+    }
 }
 
 /// The middle number; 0 where there are none.

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use super::Point;
-use crate::evaluator::{Evaluator, Points};
+use crate::evaluator::{Evaluator, Points, evaluate};
 use crate::graph::{FOOTPRINT, Graph, Settings, Slot, slots};
 use crate::library::Class;
-use crate::program::Program;
 use crate::program::op::{LANES, Lanes};
+use crate::program::{OUTPUTS, Program};
 use crate::value::Type;
 
 /// What a parameter is to a fit.
@@ -151,15 +151,11 @@ pub(super) struct Model {
 
 impl Model {
     pub(super) fn new(graph: Graph, class: Option<Class>) -> Self {
-        let slots = slots(&graph);
-        let of = |wanted: &[Role]| -> Vec<usize> {
-            let is_wanted = |slot: &Slot| slot.component == 0 && wanted.contains(&role(&graph, slot.parameter));
-            slots.iter().enumerate().filter(|(_, slot)| is_wanted(slot)).map(|(at, _)| at).collect()
-        };
-        let colors = of(&[Role::Color, Role::RandomColor]);
-        let shape = of(&[Role::Turn, Role::Shift, Role::Shape]);
-        let program = Program::new(&graph);
+        let (program, slots) = (Program::new(&graph), slots(&graph));
+        let (colors, shape) = (Vec::new(), Vec::new());
         let mut model = Self { program, graph: Arc::new(graph), class, slots, colors, shape, tone: None };
+        model.colors = model.of_roles(&[Role::Color, Role::RandomColor]);
+        model.shape = model.of_roles(&[Role::Turn, Role::Shift, Role::Shape]);
         // Panels of concrete are cells too; threads of cloth are not.
         let is_of_cells = class == Some(Class::Lattice) || class.is_some() && model.graph.name == "concrete";
         if is_of_cells && model.graph.name != "weave" {
@@ -206,6 +202,18 @@ impl Model {
         }
     }
 
+    /// The settings with other values of some parameters of one number, each within its range.
+    pub(super) fn with(&self, settings: &Settings, changes: &[(&str, f64)]) -> Settings {
+        let mut changed = settings.clone();
+        changes.iter().for_each(|(name, number)| self.set(&mut changed, name, *number));
+        changed
+    }
+
+    /// The value of a parameter of one number; 0 where the graph has none of this name.
+    pub(super) fn number(&self, settings: &Settings, name: &str) -> f64 {
+        self.slot(name).map_or(0.0, |at| settings.numbers()[at])
+    }
+
     /// Calls a function for each point with the colour there and its derivatives in the chosen slots, channel by
     /// channel.
     pub(super) fn visit(
@@ -218,7 +226,7 @@ impl Model {
         let mut evaluator = Evaluator::new(&self.program, settings, chosen);
         let mut row = vec![0.0; chosen.len()];
         for batch in points.chunks(LANES) {
-            evaluator.run(&lanes(batch));
+            evaluator.run(&Points::of(&places(batch)));
             for channel in 0..3 {
                 let slopes: Vec<Option<&Lanes>> =
                     (0..chosen.len()).map(|at| evaluator.derivative(channel, at)).collect();
@@ -232,10 +240,14 @@ impl Model {
         }
     }
 
-    /// The first slots of the parameters of a role.
+    /// The first slots of the parameters of some roles, in the order of the slots.
+    fn of_roles(&self, wanted: &[Role]) -> Vec<usize> {
+        let is_wanted = |slot: &Slot| slot.component == 0 && wanted.contains(&role(&self.graph, slot.parameter));
+        (0..self.slots.len()).filter(|at| is_wanted(&self.slots[*at])).collect()
+    }
+
     pub(super) fn of_role(&self, wanted: Role) -> Vec<usize> {
-        let is_wanted = |slot: &Slot| slot.component == 0 && role(&self.graph, slot.parameter) == wanted;
-        self.slots.iter().enumerate().filter(|(_, slot)| is_wanted(slot)).map(|(at, _)| at).collect()
+        self.of_roles(&[wanted])
     }
 
     /// Sets the parameters of a role to their defaults.
@@ -259,11 +271,11 @@ impl Model {
     /// The derivatives of the first channel at each point, where all colours are so dark that none is clamped.
     pub(super) fn slopes(&self, settings: &Settings, chosen: &[usize], points: &[Point]) -> Vec<Vec<f64>> {
         let mut grey = settings.clone();
-        self.colors.iter().for_each(|at| grey.numbers_mut()[*at..at + 3].fill(0.3));
+        self.colors.iter().flat_map(|at| *at..at + 3).for_each(|at| *grey.number_mut(at) = 0.3);
         let mut evaluator = Evaluator::new(&self.program, &grey, chosen);
         let mut all = Vec::with_capacity(points.len());
         for batch in points.chunks(LANES) {
-            evaluator.run(&lanes(batch));
+            evaluator.run(&Points::of(&places(batch)));
             let found: Vec<Option<&Lanes>> = (0..chosen.len()).map(|at| evaluator.derivative(0, at)).collect();
             let slopes =
                 |lane: usize| found.iter().map(move |of_lanes| of_lanes.map_or(0.0, |of_lanes| of_lanes[lane]));
@@ -274,20 +286,13 @@ impl Model {
 
     /// The points with the model's colours.
     pub(super) fn shown(&self, settings: &Settings, points: &[Point]) -> Vec<Point> {
-        let mut evaluator = Evaluator::new(&self.program, settings, &[]);
-        let mut shown = Vec::with_capacity(points.len());
-        for batch in points.chunks(LANES) {
-            evaluator.run(&lanes(batch));
-            shown.extend(batch.iter().enumerate().map(|(lane, point)| {
-                let [red, green, blue, ..] = evaluator.outputs(lane);
-                Point { albedo: [red, green, blue], ..*point }
-            }));
-        }
-        shown
+        let outputs = evaluate(&self.program, settings, &places(points));
+        let shown =
+            |(point, [red, green, blue, ..]): (&Point, [f64; OUTPUTS])| Point { albedo: [red, green, blue], ..*point };
+        points.iter().zip(outputs).map(shown).collect()
     }
 }
 
-fn lanes(batch: &[Point]) -> Points {
-    let at = |of: fn(&Point) -> f64| std::array::from_fn(|lane| of(&batch[lane.min(batch.len() - 1)]));
-    Points { u: at(|point| point.u), v: at(|point| point.v), footprint: at(|point| point.footprint) }
+fn places(points: &[Point]) -> Vec<[f64; 3]> {
+    points.iter().map(|point| [point.u, point.v, point.footprint]).collect()
 }

@@ -17,9 +17,10 @@ use super::candidate::Candidate;
 use super::choose::{Fit, Fitter};
 use super::model::{Model, Role, role};
 use super::statistics::Pairs;
-use super::{Point, median, split};
+use super::{Point, median, sound, split};
 use crate::error::ProceduralError;
 use crate::graph::Settings;
+use crate::program::op::sign;
 
 const TURNS: [f64; 4] = [-45.0, 0.0, 45.0, 90.0];
 const SCALES: u32 = 8;
@@ -34,10 +35,7 @@ const LEAST_SQUARE: f64 = 1e-5;
 /// Fits the graphs to points, of which unsound ones are left out: the best graph by the grid, after gradient descent,
 /// and the others as the grid left them. Fails where no point is sound.
 pub fn fit_as_paper(fitter: &Fitter, points: &[Point]) -> Result<Fit, ProceduralError> {
-    let sound: Vec<Point> = points.iter().filter(|point| point.is_sound()).copied().collect();
-    if sound.is_empty() {
-        return Err(ProceduralError::NoPoints);
-    }
+    let sound = sound(points)?;
     let (seen, held_out) = split(&sound);
     let (seen, judged) = if seen.is_empty() || held_out.is_empty() { (sound.clone(), sound) } else { (seen, held_out) };
     let loss = Loss::new(&seen);
@@ -200,10 +198,6 @@ fn unit(model: &Model, slot: usize, number: f64) -> f64 {
         Role::Shape if model.is_length(slot) => number.abs().max(1e-6),
         _ => 1.0,
     }
-}
-
-fn sign(x: f64) -> f64 {
-    f64::from(u8::from(x > 0.0)) - f64::from(u8::from(x < 0.0))
 }
 
 fn grey(color: &[f64; 3]) -> f64 {

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::cells::cell_error;
 use super::least_squares::project;
 use super::model::{Layout, Model};
-use super::waves::{Signal, Wave, waves};
+use super::waves::{Order, Signal, Wave, waves};
 use super::{Point, extent, thinned};
 use crate::graph::Settings;
 use crate::noise::cell;
@@ -33,22 +33,16 @@ impl Pattern {
 }
 
 fn own(model: &Model, length: &str, whole: Option<(&str, i32, i32)>) -> Vec<(Settings, Vec<Wave>)> {
-    let mut start = model.start();
-    model.set(&mut start, "theta", 0.0);
+    let start = model.with(&model.start(), &[("theta", 0.0)]);
     // Squares of strips have lines that are closer than their side.
     let across = if whole.is_some_and(|(name, ..)| name == "strips") { 6.0 } else { 20.0 };
     let side = across * model.slot(length).map_or(1.0, |at| start.numbers()[at]);
     let with_waves = |settings: Settings| {
-        let found = waves(&model.shown(&settings, &scattered(side)), WAVES);
+        let found = waves(&model.shown(&settings, &scattered(side)), WAVES, Order::Power);
         (settings, found)
     };
     let Some((name, least, most)) = whole else { return vec![with_waves(start)] };
-    let numbered = (least..=most).map(|number| {
-        let mut settings = start.clone();
-        model.set(&mut settings, name, f64::from(number));
-        with_waves(settings)
-    });
-    numbered.collect()
+    (least..=most).map(|number| with_waves(model.with(&start, &[(name, f64::from(number))]))).collect()
 }
 
 /// Places scattered over a square.
@@ -100,7 +94,8 @@ pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: u
             Layout::Rows { width, .. } => across_rows(model, &settings, width),
             _ => shifts(model, &settings, &basis, seen),
         };
-        shifted.extend(shifts.into_iter().map(|(agreement, shift)| (agreement, at_shift(model, &settings, shift))));
+        let at_shift = |[u, v]: [f64; 2]| model.with(&settings, &[("t_u", u), ("t_v", v)]);
+        shifted.extend(shifts.into_iter().map(|(agreement, shift)| (agreement, at_shift(shift))));
     }
     // Only where waves agree are colours worth a look.
     shifted.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -113,13 +108,6 @@ pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: u
     found.sort_by(|a, b| a.error.total_cmp(&b.error));
     found.truncate(most);
     found
-}
-
-fn at_shift(model: &Model, settings: &Settings, [u, v]: [f64; 2]) -> Settings {
-    let mut shifted = settings.clone();
-    model.set(&mut shifted, "t_u", u);
-    model.set(&mut shifted, "t_v", v);
-    shifted
 }
 
 /// A start by the error of its cells, if it has any; otherwise by that of its colours.
@@ -153,9 +141,11 @@ fn similar(model: &Model, length: &str, start: &Settings, own: &[Wave], seen: &[
     let most = if model.slots.iter().any(|slot| !slot.is_real) { 5 } else { 8 };
     for (wave, own) in seen.iter().take(most).flat_map(|wave| own.iter().map(move |own| (wave, own))) {
         for flip in flips {
-            let mut settings = start.clone();
-            model.set(&mut settings, "theta", degrees(wave.direction() - own.direction()) + flip);
-            scale_lengths(model, &mut settings, length, wave.period() / own.period());
+            // Its lines scale with the length that the pattern is made of.
+            let scale = wave.period() / own.period();
+            let scaled = [length, "gap", "joint"].map(|name| (name, model.number(start, name) * scale));
+            let turn = degrees(wave.direction() - own.direction()) + flip;
+            let settings = model.with(&model.with(start, &[("theta", turn)]), &scaled);
             if !all.iter().any(|other| is_same(other, &settings)) {
                 all.push(settings);
             }
@@ -178,14 +168,12 @@ fn rows(
     for turn in row_turns(seen) {
         for period in periods(seen, turn + FRAC_PI_2, resolution) {
             for number in whole.map_or(0..=0, |(_, least, most)| least..=most) {
-                let mut settings = start.clone();
-                model.set(&mut settings, "theta", turn.to_degrees());
                 // Only every few rows may have a gap.
-                let rows = f64::from(number.max(1));
-                model.set(&mut settings, width, period / rows);
-                model.set(&mut settings, length, period / rows * length_at / width_at);
-                whole.iter().for_each(|(name, ..)| model.set(&mut settings, name, f64::from(number)));
-                all.push(settings);
+                let across = period / f64::from(number.max(1));
+                let mut changes = vec![("theta", turn.to_degrees()), (width, across)];
+                changes.push((length, across * length_at / width_at));
+                changes.extend(whole.map(|(name, ..)| (name, f64::from(number))));
+                all.push(model.with(&start, &changes));
             }
         }
     }
@@ -206,25 +194,17 @@ fn row_turns(seen: &[Wave]) -> Vec<f64> {
 
 /// Shifts across rows, in sixths of a row, which no wave distinguishes.
 fn across_rows(model: &Model, settings: &Settings, width: &str) -> Vec<(f64, [f64; 2])> {
-    let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
-    let (sin, cos) = libm::sincos(number("theta").to_radians());
-    (0..6).map(|k| number(width) * f64::from(k) / 6.0).map(|shift| (0.0, [-sin * shift, cos * shift])).collect()
+    let (sin, cos) = libm::sincos(model.number(settings, "theta").to_radians());
+    (0..6)
+        .map(|k| model.number(settings, width) * f64::from(k) / 6.0)
+        .map(|shift| (0.0, [-sin * shift, cos * shift]))
+        .collect()
 }
 
 /// The angle in degrees, from -90 to 90.
 fn degrees(angle: f64) -> f64 {
     let turned = angle.to_degrees();
     turned - 180.0 * (turned / 180.0).round()
-}
-
-/// Scales the length that the pattern is made of, and those of its lines.
-fn scale_lengths(model: &Model, settings: &mut Settings, length: &str, scale: f64) {
-    for name in [length, "gap", "joint"] {
-        if let Some(at) = model.slot(name) {
-            let number = settings.numbers()[at] * scale;
-            model.set(settings, name, number);
-        }
-    }
 }
 
 /// Every turn that the waves suggest, with every pair of periods along the turned axes, and every shift of rows.
@@ -242,18 +222,15 @@ fn axes(
     for turn in turns(seen, if are_alike { FRAC_PI_2 } else { PI }) {
         let [along_u, along_v] = [0.0, FRAC_PI_2].map(|quarter| periods(seen, turn + quarter, resolution));
         for (&period_u, &period_v) in along_u.iter().flat_map(|u| along_v.iter().map(move |v| (u, v))) {
-            let mut settings = model.start();
-            model.set(&mut settings, "theta", turn.to_degrees());
-            model.set(&mut settings, names[0], period_u / per_length);
-            model.set(&mut settings, names[1], period_v / per_length);
-            let Some(name) = shift else {
-                all.push(settings);
-                continue;
-            };
-            for share in row_shifts(seen, turn, [period_u, period_v], resolution) {
-                let mut shifted = settings.clone();
-                model.set(&mut shifted, name, share);
-                all.push(shifted);
+            let sizes = [period_u, period_v].map(|period| period / per_length);
+            let changes = [("theta", turn.to_degrees()), (names[0], sizes[0]), (names[1], sizes[1])];
+            let settings = model.with(&model.start(), &changes);
+            match shift {
+                None => all.push(settings),
+                Some(name) => {
+                    let shares = row_shifts(seen, turn, [period_u, period_v], resolution);
+                    all.extend(shares.into_iter().map(|share| model.with(&settings, &[(name, share)])));
+                }
             }
         }
     }

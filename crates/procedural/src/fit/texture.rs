@@ -151,13 +151,8 @@ impl Sight {
     pub(super) fn judged(&self, model: &Model, settings: &Settings) -> f64 {
         let at_phase = |number: usize| {
             let [u, v] = PHASES[number];
-            let mut shifted = settings.clone();
-            for (name, add) in [("t_u", u), ("t_v", v)] {
-                if let Some(at) = model.slot(name) {
-                    let number = shifted.numbers()[at] + add;
-                    model.set(&mut shifted, name, number);
-                }
-            }
+            let moved = [("t_u", u), ("t_v", v)].map(|(name, add)| (name, model.number(settings, name) + add));
+            let shifted = model.with(settings, &moved);
             self.target.of(&self.shown(model, &shifted), number + 1).numbers
         };
         let all: Vec<[f64; COUNT]> = (0..PHASES.len()).map(at_phase).collect();

@@ -115,23 +115,16 @@ impl Signal {
 
 /// What makes a wave stand out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Order {
+pub(super) enum Order {
+    /// Its share of the variance.
     Power,
     /// Its power over that of waves of similar period: joints, which have many harmonics, before the tones of cells.
     Contrast,
 }
 
-/// Up to `most` waves, the strongest first. Fewer where the points are too few.
-pub fn waves(points: &[Point], most: usize) -> Vec<Wave> {
-    ordered_waves(points, most, Order::Power)
-}
-
-/// Up to `most` waves that stand out against those of similar period. Their share is by how much they do.
-pub(super) fn lines(points: &[Point], most: usize) -> Vec<Wave> {
-    ordered_waves(points, most, Order::Contrast)
-}
-
-fn ordered_waves(points: &[Point], most: usize, order: Order) -> Vec<Wave> {
+/// Up to `most` waves, those that stand out most first; their share is by how much they do. Fewer where the points are
+/// too few.
+pub(super) fn waves(points: &[Point], most: usize, order: Order) -> Vec<Wave> {
     if points.len() < LEAST_POINTS {
         return Vec::new();
     }
@@ -290,7 +283,7 @@ mod tests {
     fn period_and_direction_of_stripes_are_found() {
         for (period, degrees) in [(0.2, 10.0), (0.11, -35.0), (0.05, 71.0), (0.3, 88.0)] {
             let points = stripes(period, degrees);
-            let found = waves(&points, 4);
+            let found = waves(&points, 4, Order::Power);
             let best = found[0];
             assert!((best.period() / period - 1.0).abs() < 0.01, "{period}: {}", best.period());
             let off = (best.direction().to_degrees() - degrees + 90.0).rem_euclid(180.0) - 90.0;
@@ -302,7 +295,7 @@ mod tests {
         for (i, point) in noise.iter_mut().enumerate() {
             point.albedo = [0.3 + 0.3 * crate::noise::cell(i as f64 + 0.5, 9.5); 3];
         }
-        assert!(waves(&noise, 4)[0].share < 0.05);
+        assert!(waves(&noise, 4, Order::Power)[0].share < 0.05);
     }
 
     #[test]

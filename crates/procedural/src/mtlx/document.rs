@@ -1,43 +1,21 @@
 //! The XML as a tree of plain elements, and the limits on this untrusted input, which are checked before memory is
-//! taken.
+//! taken. A file that exceeds one is refused.
 
 use crate::error::{Code, Findings};
 use crate::value::shortened;
 
-/// Upper bounds. A file that exceeds one is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Bytes of the file.
-    pub bytes: usize,
-    /// Elements, texts and comments of the XML.
-    pub xml_nodes: u32,
-    /// Attributes of an element. Each is compared with all earlier ones of its element.
-    pub attributes: usize,
-    /// Namespaces of the XML. An element that declares one copies all those of its parent.
-    pub namespaces: usize,
-    /// Depth of nested elements. The elements that are supported nest four deep.
-    pub xml_depth: usize,
-    pub nodes: usize,
-    pub parameters: usize,
-    /// Findings. Further ones are only counted.
-    pub findings: usize,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            bytes: 4 << 20,
-            xml_nodes: 1 << 16,
-            attributes: 64,
-            namespaces: 16,
-            xml_depth: 8,
-            nodes: 2048,
-            parameters: 256,
-            findings: 200,
-        }
-    }
-}
-
+/// The most bytes of a file.
+pub(super) const MOST_BYTES: usize = 4 << 20;
+/// The most elements, texts and comments of the XML.
+const MOST_XML_NODES: u32 = 1 << 16;
+/// The most attributes of an element. Each is compared with all earlier ones of its element.
+const MOST_ATTRIBUTES: usize = 64;
+/// The most namespaces of the XML. An element that declares one copies all those of its parent.
+const MOST_NAMESPACES: usize = 16;
+/// The greatest depth of nested elements. The elements that are supported nest four deep.
+const MOST_DEPTH: usize = 8;
+pub(super) const MOST_NODES: usize = 2048;
+pub(super) const MOST_PARAMETERS: usize = 256;
 /// The greatest number of octaves of a fractal, since each costs as much as a noise.
 pub(super) const MOST_OCTAVES: i32 = 16;
 
@@ -95,9 +73,9 @@ impl Element {
 }
 
 /// The root element; `None`, with findings, where the text is not XML or exceeds a limit.
-pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Element> {
-    check_crowding(text, limits, findings)?;
-    let options = roxmltree::ParsingOptions { nodes_limit: limits.xml_nodes, ..Default::default() };
+pub(super) fn parse(text: &str, findings: &mut Findings) -> Option<Element> {
+    check_crowding(text, findings)?;
+    let options = roxmltree::ParsingOptions { nodes_limit: MOST_XML_NODES, ..Default::default() };
     let document = match roxmltree::Document::parse_with_options(text, options) {
         Ok(document) => document,
         Err(reason) => {
@@ -106,12 +84,12 @@ pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Opt
             return None;
         }
     };
-    let builder = Builder { lines: line_starts(text), depth: limits.xml_depth };
-    let root = builder.element(document.root_element(), 1);
-    match root {
+    let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+    let lines: Vec<usize> = std::iter::once(0).chain(ends).collect();
+    match element(&lines, document.root_element(), 1) {
         Ok(root) => Some(root),
         Err(line) => {
-            let message = format!("expected elements nested at most {} deep, found deeper ones", limits.xml_depth);
+            let message = format!("expected elements nested at most {MOST_DEPTH} deep, found deeper ones");
             findings.add(Code::Xml, Some(line), None, message);
             None
         }
@@ -119,17 +97,17 @@ pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Opt
 }
 
 /// Refuses text on which the parser would take time that grows with the square of its length.
-fn check_crowding(text: &str, limits: &Limits, findings: &mut Findings) -> Option<()> {
-    if text.matches("xmlns").count() > limits.namespaces {
-        let message = format!("expected at most {} namespaces, found more", limits.namespaces);
+fn check_crowding(text: &str, findings: &mut Findings) -> Option<()> {
+    if text.matches("xmlns").count() > MOST_NAMESPACES {
+        let message = format!("expected at most {MOST_NAMESPACES} namespaces, found more");
         findings.add(Code::Xml, None, None, message);
         return None;
     }
     let mut line = 1;
     // Values of attributes hold no `<`, so that a piece holds all attributes of an element.
     for piece in text.split('<') {
-        if most_attributes(piece) > limits.attributes {
-            let message = format!("expected at most {} attributes of an element, found more", limits.attributes);
+        if most_attributes(piece) > MOST_ATTRIBUTES {
+            let message = format!("expected at most {MOST_ATTRIBUTES} attributes of an element, found more");
             findings.add(Code::Xml, Some(line), None, message);
             return None;
         }
@@ -158,30 +136,18 @@ fn explained(reason: &roxmltree::Error) -> String {
     }
 }
 
-fn line_starts(text: &str) -> Vec<usize> {
-    let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
-    std::iter::once(0).chain(ends).collect()
-}
-
-struct Builder {
-    lines: Vec<usize>,
-    depth: usize,
-}
-
-impl Builder {
-    /// The element as a tree, or the line at which it is too deep. The recursion ends at the limit.
-    fn element(&self, node: roxmltree::Node, depth: usize) -> Result<Element, usize> {
-        let line = self.lines.partition_point(|&start| start <= node.range().start);
-        if depth > self.depth {
-            return Err(line);
-        }
-        let attributes =
-            node.attributes().map(|a| (qualified(a.namespace(), a.name()), a.value().to_owned())).collect();
-        let children = node.children().filter(roxmltree::Node::is_element);
-        let children = children.map(|child| self.element(child, depth + 1)).collect::<Result<_, _>>()?;
-        let tag = qualified(node.tag_name().namespace(), node.tag_name().name());
-        Ok(Element { tag, line, attributes, children })
+/// The element as a tree, or the line at which it is too deep. The recursion ends at the limit. `lines` are the places
+/// where lines begin.
+fn element(lines: &[usize], node: roxmltree::Node, depth: usize) -> Result<Element, usize> {
+    let line = lines.partition_point(|&start| start <= node.range().start);
+    if depth > MOST_DEPTH {
+        return Err(line);
     }
+    let attributes = node.attributes().map(|a| (qualified(a.namespace(), a.name()), a.value().to_owned())).collect();
+    let children = node.children().filter(roxmltree::Node::is_element);
+    let children = children.map(|child| element(lines, child, depth + 1)).collect::<Result<_, _>>()?;
+    let tag = qualified(node.tag_name().namespace(), node.tag_name().name());
+    Ok(Element { tag, line, attributes, children })
 }
 
 /// A name with its namespace before it, so that `xi:include` is no `include`.

@@ -11,22 +11,21 @@ use std::path::Path;
 use crate::error::{Code, Finding, Findings, ProceduralError};
 use crate::graph::{Graph, Node, Output, Parameter, Source};
 use crate::value::{Type, Value, shortened};
-pub use document::Limits;
-use document::{Element, parse};
+use document::{Element, MOST_BYTES, parse};
 use nodes::{read_nodes, read_parameters, sorted};
 
-pub fn read_file(path: &Path, limits: &Limits) -> Result<Graph, ProceduralError> {
+pub fn read_file(path: &Path) -> Result<Graph, ProceduralError> {
     use std::io::Read as _;
     let io = |source| ProceduralError::Io { path: path.to_owned(), source };
     let file = std::fs::File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
-    file.take(limits.bytes as u64 + 1).read_to_end(&mut bytes).map_err(io)?;
+    file.take(MOST_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(io)?;
     let name = path.display().to_string();
-    if bytes.len() > limits.bytes {
-        return Err(refused(name, format!("expected at most {} bytes, found more", limits.bytes)));
+    if bytes.len() > MOST_BYTES {
+        return Err(refused(name, format!("expected at most {MOST_BYTES} bytes, found more")));
     }
     match String::from_utf8(bytes) {
-        Ok(text) => read_text(&name, &text, limits),
+        Ok(text) => read_text(&name, &text),
         Err(_) => Err(refused(name, "expected UTF-8 text".to_owned())),
     }
 }
@@ -38,23 +37,22 @@ fn refused(name: String, message: String) -> ProceduralError {
 }
 
 /// Reads the text of a file called `name`. Fails with everything that is wrong with it.
-pub fn read_text(name: &str, text: &str, limits: &Limits) -> Result<Graph, ProceduralError> {
-    let mut findings = Findings::new(limits.findings);
-    let graph = read(text, limits, &mut findings);
-    match graph {
+pub fn read_text(name: &str, text: &str) -> Result<Graph, ProceduralError> {
+    let mut findings = Findings::default();
+    match read(text, &mut findings) {
         Some(graph) if findings.is_empty() => Ok(graph),
         _ => Err(ProceduralError::Invalid { name: name.to_owned(), findings: findings.into_sorted() }),
     }
 }
 
 /// The graph, or what could be read of it where there are findings.
-fn read(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Graph> {
-    if text.len() > limits.bytes {
-        let message = format!("expected at most {} bytes, found {}", limits.bytes, text.len());
+fn read(text: &str, findings: &mut Findings) -> Option<Graph> {
+    if text.len() > MOST_BYTES {
+        let message = format!("expected at most {MOST_BYTES} bytes, found {}", text.len());
         findings.add(Code::Xml, None, None, message);
         return None;
     }
-    let root = parse(text, limits, findings)?;
+    let root = parse(text, findings)?;
     check_root(&root, findings)?;
     let element = the_graph(&root, findings)?;
     check_names(&root, findings);
@@ -65,8 +63,8 @@ fn read(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Graph> {
         check_nodedef(interface, element, findings);
     }
 
-    let parameters = read_parameters(interface, limits, findings);
-    let (nodes, outputs) = read_nodes(element, &parameters, limits, findings);
+    let parameters = read_parameters(interface, findings);
+    let (nodes, outputs) = read_nodes(element, &parameters, findings);
     check_shaders(&root, element.name(), findings);
     let (nodes, outputs) = sorted(nodes, outputs, element, findings)?;
     let name = element.name();
@@ -197,7 +195,7 @@ fn check_surface(surface: &Element, graph: &str, findings: &mut Findings) {
     surface.check_attributes(&["name", "type", "doc", "xpos", "ypos"], findings);
     for input in &surface.children {
         input.check_no_children(findings);
-        let fed = Output::ALL.into_iter().any(|output| {
+        let fed = Output::ALL.iter().any(|&output| {
             let expected = [
                 ("name", surface_input(output)),
                 ("type", output.kind().word()),
@@ -246,7 +244,7 @@ fn write_graph(out: &mut String, graph: &Graph) {
     let _ = writeln!(out, "  <nodegraph name=\"NG_{}\"{doc}>", graph.name);
     graph.parameters.iter().for_each(|parameter| write_parameter(out, parameter));
     graph.nodes.iter().for_each(|node| write_node(out, graph, node));
-    for (output, source) in Output::ALL.into_iter().zip(&graph.outputs) {
+    for (output, source) in Output::ALL.iter().zip(&graph.outputs) {
         let connection = connection(graph, source);
         let _ = writeln!(out, "    <output {} {connection} />", named(output.word(), output.kind()));
     }
@@ -302,7 +300,7 @@ fn connection(graph: &Graph, source: &Source) -> String {
 
 fn write_material(out: &mut String, name: &str) {
     let _ = writeln!(out, "  <standard_surface name=\"SR_{name}\" type=\"surfaceshader\">");
-    for output in Output::ALL {
+    for &output in Output::ALL {
         let input = named(surface_input(output), output.kind());
         let _ = writeln!(out, "    <input {input} nodegraph=\"NG_{name}\" output=\"{}\" />", output.word());
     }

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::document::{Element, Limits, MOST_OCTAVES};
+use super::document::{Element, MOST_NODES, MOST_OCTAVES, MOST_PARAMETERS};
 use crate::error::{Code, Findings};
 use crate::graph::{FOOTPRINT, Node, Output, Parameter, Source};
 use crate::node::{Kind, Signature, is_ignored_input, signatures};
@@ -27,13 +27,13 @@ const KNOWN: [&str; 13] = [
 
 /// Reads the `<input>` children. One that cannot be read is reported and replaced by a zero, so that those that use it
 /// are still checked.
-pub(super) fn read_parameters(interface: &Element, limits: &Limits, findings: &mut Findings) -> Vec<Parameter> {
+pub(super) fn read_parameters(interface: &Element, findings: &mut Findings) -> Vec<Parameter> {
     let inputs: Vec<&Element> = interface.children.iter().filter(|child| child.tag == "input").collect();
-    if inputs.len() > limits.parameters {
-        let message = format!("expected at most {} inputs, found {}", limits.parameters, inputs.len());
+    if inputs.len() > MOST_PARAMETERS {
+        let message = format!("expected at most {MOST_PARAMETERS} inputs, found {}", inputs.len());
         interface.report(findings, Code::TooMany, message);
     }
-    inputs.into_iter().take(limits.parameters).map(|input| parameter(input, findings)).collect()
+    inputs.into_iter().take(MOST_PARAMETERS).map(|input| parameter(input, findings)).collect()
 }
 
 fn parameter(input: &Element, findings: &mut Findings) -> Parameter {
@@ -98,12 +98,11 @@ fn check_range(input: &Element, parameter: &Parameter, findings: &mut Findings) 
 pub(super) fn read_nodes(
     graph: &Element,
     parameters: &[Parameter],
-    limits: &Limits,
     findings: &mut Findings,
 ) -> (Vec<Node>, [Source; 3]) {
     let elements: Vec<&Element> = graph.children.iter().filter(|c| c.tag != "input" && c.tag != "output").collect();
-    if elements.len() > limits.nodes {
-        let message = format!("expected at most {} nodes, found {}", limits.nodes, elements.len());
+    if elements.len() > MOST_NODES {
+        let message = format!("expected at most {MOST_NODES} nodes, found {}", elements.len());
         graph.report(findings, Code::TooMany, message);
         return (Vec::new(), [Source::Unset, Source::Unset, Source::Unset]);
     }
@@ -276,7 +275,7 @@ fn outputs(graph: &Element, names: &Names, findings: &mut Findings) -> [Source; 
             element.report(findings, Code::Output, message);
         }
     }
-    Output::ALL.map(|output| {
+    [Output::BaseColor, Output::Roughness, Output::Metallic].map(|output| {
         let Some(element) = elements.iter().find(|element| element.name() == output.word()) else {
             graph.report(findings, Code::Output, format!("expected an output '{}', found none", output.word()));
             return Source::Unset;

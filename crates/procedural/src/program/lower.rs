@@ -67,11 +67,11 @@ pub(super) enum Argument {
 
 /// The inputs of a node, in the order of its signature.
 #[derive(Clone, Copy)]
-struct Arguments<'a>(pub(super) &'a [Argument]);
+struct Arguments<'a>(&'a [Argument]);
 
 impl Arguments<'_> {
     /// All components of an input; none for a whole number.
-    pub(super) fn all(&self, input: usize) -> &[Reg] {
+    fn all(&self, input: usize) -> &[Reg] {
         match &self.0[input] {
             Argument::Regs(regs) => regs,
             Argument::Count(_) => &[],
@@ -79,13 +79,13 @@ impl Arguments<'_> {
     }
 
     /// A component of an input. A float serves as every component.
-    pub(super) fn at(&self, input: usize, component: usize) -> Reg {
+    fn at(&self, input: usize, component: usize) -> Reg {
         let regs = self.all(input);
         if regs.len() == 1 { regs[0] } else { regs[component] }
     }
 
     /// A whole number.
-    pub(super) fn count(&self, input: usize) -> Count {
+    fn count(&self, input: usize) -> Count {
         match &self.0[input] {
             Argument::Count(count) => *count,
             Argument::Regs(_) => unreachable!("signatures give these inputs the type integer"),
@@ -93,7 +93,7 @@ impl Arguments<'_> {
     }
 
     /// A whole number that the reader has checked to be a constant.
-    pub(super) fn constant(&self, input: usize) -> usize {
+    fn constant(&self, input: usize) -> usize {
         match self.count(input) {
             Count::Number(number) => usize::try_from(number).unwrap_or(0),
             Count::Slot(_) => unreachable!("the reader refuses parameters here"),
@@ -105,26 +105,31 @@ impl Arguments<'_> {
 pub(super) fn lower(b: &mut Builder, kind: Kind, signature: &Signature, arguments: &[Argument]) -> Vec<Vec<Reg>> {
     let args = Arguments(arguments);
     let out = signature.outputs[0].1;
-    match kind {
-        Kind::Separate2 | Kind::Separate3 => args.all(0).iter().map(|&reg| vec![reg]).collect(),
-        Kind::Texcoord => vec![vec![b.push(Op::PlaceU), b.push(Op::PlaceV)]],
-        Kind::Position => vec![vec![b.push(Op::PlaceU), b.push(Op::PlaceV), b.number(0.0)]],
-        Kind::Convert if args.all(0).is_empty() => vec![vec![count(b, args.count(0))]],
-        Kind::Convert | Kind::Rotate2d | Kind::Combine2 | Kind::Combine3 | Kind::Extract | Kind::Luminance => {
-            vec![combined(b, kind, out, args)]
+    vec![match kind {
+        Kind::Separate2 | Kind::Separate3 => return args.all(0).iter().map(|&reg| vec![reg]).collect(),
+        Kind::Texcoord => vec![b.push(Op::PlaceU), b.push(Op::PlaceV)],
+        Kind::Position => vec![b.push(Op::PlaceU), b.push(Op::PlaceV), b.number(0.0)],
+        Kind::Convert if args.all(0).is_empty() => vec![count(b, args.count(0))],
+        Kind::Convert => convert(b, out, args.all(0)),
+        Kind::Combine2 => (0..2).map(|input| args.at(input, 0)).collect(),
+        Kind::Combine3 => (0..3).map(|input| args.at(input, 0)).collect(),
+        Kind::Extract => vec![args.all(0)[args.constant(1)]],
+        Kind::Rotate2d => rotate(b, args),
+        Kind::Luminance => vec![dot(b, args.all(0), args.all(1)); 3],
+        Kind::DotProduct => vec![dot(b, args.all(0), args.all(1))],
+        Kind::Magnitude => vec![length(b, args.all(0))],
+        Kind::Distance => {
+            let pairs = args.all(0).iter().zip(args.all(1));
+            let between: Vec<Reg> = pairs.map(|(&p, &q)| b.sub(p, q)).collect();
+            vec![length(b, &between)]
         }
-        Kind::DotProduct | Kind::Magnitude | Kind::Distance | Kind::Normalize => {
-            vec![combined(b, kind, out, args)]
+        Kind::Normalize => {
+            let length = length(b, args.all(0));
+            args.all(0).iter().map(|&x| b.binary(Binary::Div, x, length)).collect()
         }
-        Kind::Noise2d | Kind::Fractal2d | Kind::CellNoise2d | Kind::WorleyNoise2d => {
-            vec![noise(b, kind, out, args)]
-        }
-        _ => vec![each_component(b, kind, out, args)],
-    }
-}
-
-fn each_component(b: &mut Builder, kind: Kind, out: Type, args: Arguments) -> Vec<Reg> {
-    (0..out.width()).map(|c| component(b, kind, |input| args.at(input, c))).collect()
+        Kind::Noise2d | Kind::Fractal2d | Kind::CellNoise2d | Kind::WorleyNoise2d => noise(b, kind, out, args),
+        _ => (0..out.width()).map(|c| component(b, kind, |input| args.at(input, c))).collect(),
+    }]
 }
 
 /// One component of a node, whose inputs are `x(0)`, `x(1)`, ...
@@ -239,30 +244,6 @@ fn switch(b: &mut Builder, x: impl Fn(usize) -> Reg) -> Reg {
         found = b.push(Op::Select(Test::Greater, [bound, which, x(input), found]));
     }
     found
-}
-
-/// The components of a node's output.
-fn combined(b: &mut Builder, kind: Kind, out: Type, args: Arguments) -> Vec<Reg> {
-    match kind {
-        Kind::Combine2 => (0..2).map(|input| args.at(input, 0)).collect(),
-        Kind::Combine3 => (0..3).map(|input| args.at(input, 0)).collect(),
-        Kind::Extract => vec![args.all(0)[args.constant(1)]],
-        Kind::Convert => convert(b, out, args.all(0)),
-        Kind::Rotate2d => rotate(b, args),
-        Kind::Luminance => vec![dot(b, args.all(0), args.all(1)); 3],
-        Kind::DotProduct => vec![dot(b, args.all(0), args.all(1))],
-        Kind::Magnitude => vec![length(b, args.all(0))],
-        Kind::Distance => {
-            let pairs = args.all(0).iter().zip(args.all(1));
-            let between: Vec<Reg> = pairs.map(|(&p, &q)| b.sub(p, q)).collect();
-            vec![length(b, &between)]
-        }
-        Kind::Normalize => {
-            let length = length(b, args.all(0));
-            args.all(0).iter().map(|&x| b.binary(Binary::Div, x, length)).collect()
-        }
-        _ => unreachable!("the caller passes these nodes only"),
-    }
 }
 
 /// A float fills all components; a longer vector is cut, a shorter one is filled with zeros.

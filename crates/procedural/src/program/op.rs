@@ -229,7 +229,7 @@ fn unary(function: Unary, x: [&Lanes; OPERANDS], out: &mut Outcome) {
     }
 }
 
-fn sign(x: f64) -> f64 {
+pub(crate) fn sign(x: f64) -> f64 {
     f64::from(u8::from(x > 0.0)) - f64::from(u8::from(x < 0.0))
 }
 

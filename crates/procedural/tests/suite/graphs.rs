@@ -4,7 +4,7 @@
 use mateval_procedural::evaluator::Points;
 use mateval_procedural::graph::slots;
 use mateval_procedural::library::{LIBRARY, entry};
-use mateval_procedural::mtlx::{Limits, read_text, to_text};
+use mateval_procedural::mtlx::{read_text, to_text};
 use mateval_procedural::program::op::LANES;
 use mateval_procedural::{Evaluator, Graph, ProceduralError, Program, Settings};
 
@@ -28,7 +28,7 @@ pub fn text(inputs: &str, nodes: &str, color: &str) -> String {
 
 /// Reads a file.
 pub fn read(text: &str) -> Result<Graph, ProceduralError> {
-    read_text("test.mtlx", text, &Limits::default())
+    read_text("test.mtlx", text)
 }
 
 /// The findings of a file, each on one line; none where it is accepted.
@@ -192,7 +192,7 @@ fn nodes_may_stand_before_those_that_they_need() {
 
 #[test]
 fn a_file_that_does_not_exist_is_an_io_error() {
-    let error = mateval_procedural::mtlx::read_file("no/such.mtlx".as_ref(), &Default::default()).unwrap_err();
+    let error = mateval_procedural::mtlx::read_file("no/such.mtlx".as_ref()).unwrap_err();
     assert!(matches!(error, ProceduralError::Io { .. }), "{error}");
 }
 

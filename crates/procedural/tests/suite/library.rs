@@ -8,7 +8,7 @@ use mateval_procedural::graph::{FOOTPRINT, Slot, slots};
 use mateval_procedural::library::{LIBRARY, entry};
 use mateval_procedural::program::OUTPUTS;
 use mateval_procedural::program::op::{LANES, Lanes};
-use mateval_procedural::{Evaluator, Graph, ProceduralError, Program, Settings};
+use mateval_procedural::{Evaluator, Graph, Program, Settings};
 
 use super::graphs::{read, scattered, text};
 
@@ -302,7 +302,7 @@ fn values_that_are_not_finite_are_errors() {
         render(&Program::new(&graph), &Settings::defaults(&graph), square)
     };
     let error = render(great).unwrap_err();
-    assert!(matches!(error, ProceduralError::NotFinite { output: "red", .. }), "{error}");
+    assert!(error.to_string().contains("its red is"), "{error}");
     assert!(render(&great.replace("1000", "1")).is_ok());
 }
 
@@ -310,7 +310,7 @@ fn values_that_are_not_finite_are_errors() {
 fn sizes_are_checked() {
     for (size, resolution) in [(0.0, 4), (-1.0, 4), (f64::NAN, 4), (f64::INFINITY, 4), (1.0, 0), (1.0, 4097)] {
         assert!(
-            matches!(Square::new(size, resolution), Err(ProceduralError::PictureSize { .. })),
+            Square::new(size, resolution).unwrap_err().to_string().contains("1 to 4096 pixels a side"),
             "{size} {resolution}"
         );
     }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use mateval_dataset::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
-use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SurfaceIndex};
+use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, SurfaceIndex};
 use mateval_dataset::{Camera, Intrinsics};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_testkit::scenes::{box_camera, box_quad, box_room};
 use mateval_tracer::aov::hit_through;
 use mateval_tracer::error::{RequestFault, TracerError};
-use mateval_tracer::{AssumedSurfaces, LightBasis, PhotoCache, RenderSettings, SplitLight, World, render, split_light};
+use mateval_tracer::{AssumedSurfaces, PhotoCache, RenderSettings, SplitLight, World, render, split_light};
 
 const COLOR: f32 = 0.6;
 const ROUGHNESS: f32 = 0.4;
@@ -71,11 +71,7 @@ fn walls(world: &World) -> Mask {
 fn split(world: &World, photo: &Picture<LinearRgb>, cached: &Mask, samples: u32) -> SplitLight {
     let camera = view();
     let cache = PhotoCache::new(world, &camera, photo, cached).unwrap();
-    let assumed = AssumedSurfaces {
-        colors: &[[COLOR; 3]; SURFACES],
-        roughnesses: &[ROUGHNESS; SURFACES],
-        metals: &[false; SURFACES],
-    };
+    let assumed = AssumedSurfaces { colors: &[[COLOR; 3]; SURFACES], roughnesses: &[ROUGHNESS; SURFACES] };
     split_light(world, &cache, &photo.map(|_| true), assumed, &settings(samples), &|_, _| ()).unwrap()
 }
 
@@ -113,56 +109,9 @@ fn the_parts_make_the_photo_again() {
 
     let camera = view();
     let cache = PhotoCache::new(&world, &camera, &photo, &nothing).unwrap();
-    let assumed = AssumedSurfaces {
-        colors: &[[0.5 * COLOR; 3]; SURFACES],
-        roughnesses: &[ROUGHNESS; SURFACES],
-        metals: &[false; SURFACES],
-    };
+    let assumed = AssumedSurfaces { colors: &[[0.5 * COLOR; 3]; SURFACES], roughnesses: &[ROUGHNESS; SURFACES] };
     let darker = split_light(&world, &cache, &photo.map(|_| true), assumed, &settings(64), &|_, _| ()).unwrap();
     assert!(ratio(&darker, &photo)[0] < 0.9, "the twin passes");
-}
-
-/// The light of a metal is gloss alone; it makes the photo again. A twin that takes the metal for plastic does not.
-#[test]
-fn a_metal_is_gloss_alone() {
-    /// The floor.
-    const METAL: usize = 0;
-    let mut scene = room();
-    let mut metal = scene.materials[0].clone();
-    let MaterialModel::Principled { metallic, .. } = &mut metal.model else { unreachable!("set above") };
-    *metallic = ScalarInput::Constant(1.0);
-    scene.materials.push(metal);
-    scene.surfaces[METAL].material = MaterialIndex(1);
-    let world = World::new(Arc::new(scene)).unwrap();
-    let (photo, camera) = (photo(&world), view());
-    // The floor is convex: a pixel whose corners show it shows nothing else.
-    let shown = Mask::from_fn(32, 18, |x, y| {
-        [[0, 0], [0, 1], [1, 0], [1, 1]].iter().all(|[dx, dy]| {
-            let hit = hit_through(&world, &camera, DVec2::new((x + dx) as f64, (y + dy) as f64));
-            hit.is_some_and(|hit| hit.surface.0 == METAL)
-        })
-    });
-    let count = shown.pixels().iter().filter(|shown| **shown).count();
-    assert!(count > 20, "the view hardly shows the metal: {count} pixels");
-    let nothing = photo.map(|_| false);
-    let cache = PhotoCache::new(&world, &camera, &photo, &nothing).unwrap();
-    let split = |metals: &[bool; SURFACES]| {
-        let assumed = AssumedSurfaces { colors: &[[COLOR; 3]; SURFACES], roughnesses: &[ROUGHNESS; SURFACES], metals };
-        let split = split_light(&world, &cache, &photo.map(|_| true), assumed, &settings(256), &|_, _| ()).unwrap();
-        let sum = |basis: &LightBasis| -> f64 {
-            let whole = basis.weighted(&[[1.0; 3]; 3]).unwrap();
-            whole.pixels().iter().zip(shown.pixels()).filter(|(_, shown)| **shown).map(|(v, _)| v.luminance()).sum()
-        };
-        let diffuse = sum(&split.diffuse);
-        (ratio(&split, &photo), diffuse)
-    };
-    let mut metals = [false; SURFACES];
-    let (_, plastic) = split(&metals);
-    assert!(plastic > 0.0, "the twin has no diffuse light");
-    metals[METAL] = true;
-    let ([mean, deviation], diffuse) = split(&metals);
-    assert!((mean - 1.0).abs() < 0.01 && deviation < 0.05, "{mean} {deviation}");
-    assert_eq!(diffuse, 0.0);
 }
 
 /// Light that the photo holds is booked apart: lamps have less of it, and the photo's own picture is not black.
@@ -203,11 +152,7 @@ fn what_does_not_fit_the_world_is_refused() {
     let photo = Picture::filled(32, 18, LinearRgb::default());
     let all = photo.map(|_| true);
     let cache = PhotoCache::new(&world, &camera, &photo, &all).unwrap();
-    let assumed = AssumedSurfaces {
-        colors: &[[COLOR; 3]; SURFACES],
-        roughnesses: &[ROUGHNESS; SURFACES - 1],
-        metals: &[false; SURFACES],
-    };
+    let assumed = AssumedSurfaces { colors: &[[COLOR; 3]; SURFACES], roughnesses: &[ROUGHNESS; SURFACES - 1] };
     let found = split_light(&world, &cache, &all, assumed, &settings(1), &|_, _| ()).unwrap_err();
     assert!(
         matches!(found, TracerError::InvalidRequest(RequestFault::OtherWorld { found: 7, expected: 8 })),
