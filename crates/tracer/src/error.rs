@@ -1,7 +1,5 @@
 //! The error of this crate, split by what a caller can do about it.
 
-use std::ops::Range;
-
 use glam::Vec3;
 use mateval_dataset::reference::{LightIndex, MaterialIndex, SurfaceIndex};
 
@@ -152,9 +150,6 @@ pub enum RequestFault {
     /// A hierarchy is shared with a scene of other triangles.
     #[error("the hierarchy was built from other triangles than the scene's: it holds {hierarchy}, the scene {scene}")]
     OtherTriangles { hierarchy: usize, scene: usize },
-    /// Groups of lights were made for another scene.
-    #[error("the light groups hold {found} lights, the scene has {expected}")]
-    GroupedLights { found: usize, expected: usize },
     /// The number of lists of light mixes differs from the number of predictions.
     #[error("light mixes for {found} predictions, expected {expected}")]
     MixedPredictions {
@@ -205,9 +200,6 @@ pub enum RequestFault {
     /// Predictions are used with another world than they were made for.
     #[error("predictions for {found} surfaces in a world of {expected}")]
     OtherWorld { found: usize, expected: usize },
-    /// The requested predictions do not exist.
-    #[error("predictions {found:?} were requested, expected a range within 0..{count}")]
-    Predictions { found: Range<usize>, count: usize },
     /// Pictures of one light basis differ in size, or a picture differs from the view that it belongs to.
     #[error("a picture of {}x{}, expected {}x{}", found[0], found[1], expected[0], expected[1])]
     PictureSize {
@@ -224,10 +216,7 @@ pub enum ExceededLimit {
     /// More triangles than the hierarchy can number.
     #[error("{found} triangles, the limit is {limit}")]
     Triangles { found: usize, limit: usize },
-    /// The pictures of a single group of lights take more memory than is allowed.
-    #[error(
-        "{halves} halves of {views} views take {group_bytes} bytes per group of lights, and {allowed} are allowed; \
-         allow more, or make fewer views at a time"
-    )]
-    BasisBytes { halves: usize, views: usize, group_bytes: u64, allowed: u64 },
+    /// The pictures of a view's lights take too much memory.
+    #[error("{pictures} pictures of {width}x{height} take {bytes} bytes, the limit is {limit}")]
+    PictureBytes { pictures: usize, width: usize, height: usize, bytes: u64, limit: u64 },
 }

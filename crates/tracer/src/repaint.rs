@@ -168,16 +168,14 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
 }
 
 /// [`crate::render_views`] with predictions in place of the world's own materials. Returns one render for each
-/// prediction of the range `which`.
+/// prediction.
 ///
 /// Up to eight predictions share their paths. The bytes of each render are the same as if its prediction were rendered
-/// alone. Fails as [`crate::render_views`] does, and if `which` exceeds the predictions of `repaint`, or if mixes do
-/// not match predictions and lights.
-#[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
+/// alone. Fails as [`crate::render_views`] does, if `repaint` was made for another world, or if mixes do not match
+/// predictions and lights.
 pub fn render_repainted(
     world: &World,
     repaint: &Repaint,
-    which: Range<usize>,
     cameras: &[Camera],
     lighting: Lighting<'_>,
     settings: &RenderSettings,
@@ -185,7 +183,10 @@ pub fn render_repainted(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ViewsRender>, TracerError> {
     // Check everything before the first path.
-    check_predictions(world, repaint, &which)?;
+    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
+    if found != expected {
+        return Err(RequestFault::OtherWorld { found, expected }.into());
+    }
     let job = |Range { start: first, end }: Range<usize>| {
         let subject =
             Subject { world, materials: Painted { world, repaint, first }, first, variants: end - first, lighting };
@@ -193,7 +194,8 @@ pub fn render_repainted(
     };
     let planes = job(0..0).planes(repaint.predictions)?;
     // Render the predictions in rounds that share their paths.
-    let rounds = rounds(which);
+    let starts = (0..repaint.predictions).step_by(MOST_VARIANTS);
+    let rounds: Vec<_> = starts.map(|start| start..repaint.predictions.min(start + MOST_VARIANTS)).collect();
     let progress = Progress::new(job(0..0).tiles(&planes) * rounds.len(), progress);
     let mut renders = Vec::new();
     for round in rounds {
@@ -207,22 +209,6 @@ pub fn render_repainted(
         });
     }
     Ok(renders)
-}
-
-fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
-    let end = which.end;
-    which.step_by(MOST_VARIANTS).map(|start| start..end.min(start + MOST_VARIANTS)).collect()
-}
-
-fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), RequestFault> {
-    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
-    if found != expected {
-        return Err(RequestFault::OtherWorld { found, expected });
-    }
-    if which.end > repaint.predictions {
-        return Err(RequestFault::Predictions { found: which.clone(), count: repaint.predictions });
-    }
-    Ok(())
 }
 
 /// Checks the arguments of [`Repaint::new`] and returns the number of predictions.

@@ -182,9 +182,10 @@ pub fn split_light(
         return Err(RequestFault::PictureSize { found, expected: [width, height] }.into());
     }
     let pictures = world.emitters().groups() + 1;
-    let group_bytes = (2 * width * height * size_of::<LinearRgb>()) as u64;
-    if group_bytes.saturating_mul(pictures as u64) > MOST_BYTES {
-        return Err(ExceededLimit::BasisBytes { halves: 1, views: 1, group_bytes, allowed: MOST_BYTES }.into());
+    let bytes = (2 * width * height * size_of::<LinearRgb>()) as u64 * pictures as u64;
+    if bytes > MOST_BYTES {
+        let pictures = 2 * pictures;
+        return Err(ExceededLimit::PictureBytes { pictures, width, height, bytes, limit: MOST_BYTES }.into());
     }
     let tables = BlenderTables::new(eta_from_specular(SPECULAR));
     let split = Split { assumed, cache, tables: &tables };

@@ -52,8 +52,7 @@ impl Paths<'_> {
         let seeds = [self.seed(stream)];
         let settings = self.rules.settings(samples);
         let shown = |done: usize, all: usize| (self.progress)(Report::step(&what, done, all));
-        let which = 0..repaint.predictions();
-        Ok(render_repainted(self.world, repaint, which, cameras, lighting, &settings, &seeds, &shown)?)
+        Ok(render_repainted(self.world, repaint, cameras, lighting, &settings, &seeds, &shown)?)
     }
 
     /// The quarters of the first `predictions` that travel, by prediction, light mix and view, and the number of
@@ -133,5 +132,5 @@ pub(crate) fn batches(all: &[PredictedScene], predictions: &[usize], others: usi
 
 /// A picture of one view. Every stream has one seed, so the tracer's list of halves holds one.
 pub(crate) fn picture_of(render: &ViewsRender, view: usize, picture: usize) -> &Picture<LinearRgb> {
-    &render.views[view].halves[0].basis.pictures()[picture]
+    &render.views[view].halves[0].pictures()[picture]
 }

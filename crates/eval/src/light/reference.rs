@@ -20,7 +20,7 @@ use mateval_files::untrusted::sha256_of_file;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
-use mateval_tracer::{LightGroups, Lighting, World};
+use mateval_tracer::{Lighting, World};
 
 use crate::error::EvalError;
 use crate::light::difference::encoded;
@@ -142,14 +142,13 @@ impl Maker<'_> {
         let truth = true_maps(folder, self.scene)?;
         let repaint = paths.repaint(&[&truth], None)?;
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-        let groups = LightGroups::apart(file.lights.len());
-        let half = |stream| paths.trace(&repaint, Lighting::Apart(&groups), &cameras, self.samples, stream);
+        let half = |stream| paths.trace(&repaint, Lighting::Apart, &cameras, self.samples, stream);
         let [a, b] = [half("a")?.remove(0), half("b")?.remove(0)];
         if set == ViewSet::Turned {
             file.seeds = ["a", "b"].map(|stream| format!("{:016x}", paths.seed(stream)));
         }
         for ((view, a), b) in views.iter().zip(a.views).zip(b.views) {
-            let [a, b] = [&a.halves[0].basis, &b.halves[0].basis];
+            let [a, b] = [&a.halves[0], &b.halves[0]];
             let valid = png_io::read_mask(&folder.view(&view.id).join("valid.png"))?;
             file.variance.insert(view.id.clone(), variance([&a.sum(), &b.sum()], &valid, self.scene.exposure));
             let of_view = self.folder.join(view.id.as_str());
@@ -318,7 +317,7 @@ mod tests {
         let mix: Vec<[f64; 3]> = (0..groups.len()).map(|at| [1.0, 0.5, 2.0].map(|v| v * (1 + at) as f64)).collect();
         let mixes = [vec![mix.clone()]];
         let fresh = paths.trace(&repaint, Lighting::Mixed(&mixes), &[view.camera], 128, "a").unwrap().remove(0);
-        let fresh = mean(&fresh.views[0].halves[0].basis.pictures()[0]);
+        let fresh = mean(&fresh.views[0].halves[0].pictures()[0]);
         let size = [groups[0].width(), groups[0].height()];
         let found = mean(&weighted(&groups, &mix, 1.0, size));
         let twin = mean(&weighted(&groups, &vec![[1.0; 3]; groups.len()], 1.0, size));

@@ -23,7 +23,7 @@ use mateval_dataset::render_file::RenderNoise;
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
 use mateval_image::{ImageError, Picture, exr_io, png_io};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
-use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
+use mateval_tracer::{LightBasis, RenderSettings, RenderStats, World, render_views};
 
 use crate::blender::LightPictures;
 pub use crate::blender::{BlenderLimits, BlenderProgram};
@@ -178,10 +178,9 @@ fn render_scene(
         let step = format!("view {}", view.id);
         let shown = |done: usize, all: usize| progress(Report::step(&step, done, all));
         let settings = RenderSettings { samples: run.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
-        let groups = LightGroups::apart(world.emitters().groups());
-        let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
+        let mut render = render_views(world, &[view.camera], &settings, &seeds, &shown)?;
         let [a, b]: [LightPictures; 2] =
-            std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
+            std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0)));
         let shown = without_noise(&folder, view, [&a, &b])?;
         report.remarks.extend(remark(&format!("{id} {}", view.id), &render.stats));
         let file = RenderFile {

@@ -18,7 +18,7 @@ use mateval_image::Picture;
 use rayon::prelude::*;
 
 use crate::error::{RequestFault, TracerError};
-use crate::light_basis::{LightBasis, LightGroups};
+use crate::light_basis::LightBasis;
 use crate::path::{MaterialSource, OwnMaterials, PathCounts, PathTracer, RenderSettings};
 use crate::ray::Ray;
 use crate::render::{self, RenderStats};
@@ -30,7 +30,7 @@ use plane::{Numbering, Plane, PlaneView, Window, cell_points};
 #[derive(Clone, Copy, Debug)]
 pub enum Lighting<'a> {
     /// One per group of lights, under the scene's own radiances.
-    Apart(&'a LightGroups),
+    Apart,
     /// For each prediction (or material variant) the same number of mixes, one picture each.
     Mixed(&'a [Vec<LightMix>]),
 }
@@ -43,9 +43,7 @@ pub type LightMix = Vec<[f64; 3]>;
 pub struct ViewsRender {
     /// In the order of the cameras.
     pub views: Vec<ViewLight>,
-    /// The number of path sets per seed: 1 if the views share a centre, otherwise one per view.
-    pub passes: usize,
-    /// Counts over all passes and seeds.
+    /// Counts over all views and seeds.
     pub stats: RenderStats,
 }
 
@@ -53,16 +51,7 @@ pub struct ViewsRender {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewLight {
     /// In the order of the seeds.
-    pub halves: Vec<HalfLight>,
-}
-
-/// One of several independent estimates of a view.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HalfLight {
-    /// Linear radiance: one picture per group of lights, or per mix of lights, by [`Lighting`].
-    pub basis: LightBasis,
-    /// The number of paths that each pixel received.
-    pub counts: Picture<u32>,
+    pub halves: Vec<LightBasis>,
 }
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
@@ -72,18 +61,15 @@ pub struct HalfLight {
 /// number of finished tiles and their total. The bytes of the pictures are the same for any number of threads in the
 /// current rayon pool.
 ///
-/// Fails if a setting is out of range, if a seed occurs twice (two halves would be the same), or if the groups were
-/// made for another number of lights.
+/// Fails if a setting is out of range, or if a seed occurs twice: two halves would be the same.
 pub fn render_views(
     world: &World,
     cameras: &[Camera],
-    groups: &LightGroups,
     settings: &RenderSettings,
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ViewsRender, TracerError> {
-    let lighting = Lighting::Apart(groups);
-    let subject = Subject { world, materials: OwnMaterials(world), first: 0, variants: 1, lighting };
+    let subject = Subject { world, materials: OwnMaterials(world), first: 0, variants: 1, lighting: Lighting::Apart };
     let job = ViewsJob { subject, cameras, settings, seeds };
     let planes = job.planes(1)?;
     let mut renders = job.render::<1>(&planes, &Progress::new(job.tiles(&planes), progress));
@@ -174,7 +160,6 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         // Attach the counts of each variant.
         let of_variant = |(variant, views): (usize, Vec<ViewLight>)| ViewsRender {
             views,
-            passes: planes.len(),
             stats: stats(&counts, variant),
         };
         views.into_iter().enumerate().map(of_variant).collect()
@@ -219,27 +204,21 @@ fn stats(tiles: &[TileCounts], variant: usize) -> RenderStats {
 }
 
 impl Lighting<'_> {
-    /// The number of pictures per view.
-    fn pictures(&self) -> usize {
+    /// The number of pictures per view of a scene with this many lights.
+    fn pictures(&self, lights: usize) -> usize {
         match self {
-            Self::Apart(groups) => groups.groups().len(),
+            Self::Apart => lights,
             Self::Mixed(mixes) => mixes.first().map_or(0, Vec::len),
         }
     }
 
-    /// Fails unless the lights number `lights` and the mixes `variants`, with finite weights of at least 0.
+    /// Fails unless mixes are for `variants` variants and `lights` lights, with finite weights of at least 0.
     fn check(&self, lights: usize, variants: usize) -> Result<(), RequestFault> {
-        let mixes = match self {
-            Self::Apart(groups) if groups.lights() == lights => return Ok(()),
-            Self::Apart(groups) => {
-                return Err(RequestFault::GroupedLights { found: groups.lights(), expected: lights });
-            }
-            Self::Mixed(mixes) => *mixes,
-        };
+        let Self::Mixed(mixes) = self else { return Ok(()) };
         if mixes.len() != variants {
             return Err(RequestFault::MixedPredictions { found: mixes.len(), expected: variants });
         }
-        let expected = self.pictures();
+        let expected = self.pictures(lights);
         if let Some(prediction) = mixes.iter().position(|mixes| mixes.len() != expected) {
             return Err(RequestFault::MixCount { prediction, found: mixes[prediction].len(), expected });
         }
@@ -277,7 +256,7 @@ fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
     settings: &RenderSettings,
     counts: &mut Vec<TileCounts>,
     done: &(impl Fn() + Sync),
-) -> Vec<Vec<HalfLight>> {
+) -> Vec<Vec<LightBasis>> {
     let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
     let mut films = exposure.blank_films();
     // Tiles are merged in their own order, whichever finishes first; batches limit how many wait in memory.
@@ -317,7 +296,6 @@ struct ExposedTile<const K: usize> {
 struct Part<const K: usize> {
     window: Window,
     sums: Vec<[[f64; 3]; K]>,
-    counts: Vec<u32>,
 }
 
 /// The number of paths traced together; slightly more if a cell has several.
@@ -361,16 +339,14 @@ struct PathLight<const K: usize> {
 
 impl<'w, M: Copy> Exposure<'w, '_, M> {
     fn pictures(&self) -> usize {
-        self.subject.lighting.pictures()
+        self.subject.lighting.pictures(self.subject.world.emitters().groups())
     }
 
-    fn blank_films(&self) -> Vec<Vec<HalfLight>> {
-        let blank = |(width, height): (usize, usize)| HalfLight {
-            basis: LightBasis::black(width, height, self.pictures()),
-            counts: Picture::filled(width, height, 0),
+    fn blank_films(&self) -> Vec<Vec<LightBasis>> {
+        let blank = |PlaneView { intrinsics: k, .. }: &PlaneView| {
+            LightBasis::black(k.width as usize, k.height as usize, self.pictures())
         };
-        let size = |view: &PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
-        self.plane.views().iter().map(size).map(|size| vec![blank(size); self.subject.variants]).collect()
+        self.plane.views().iter().map(|view| vec![blank(view); self.subject.variants]).collect()
     }
 
     fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
@@ -460,10 +436,12 @@ impl<const K: usize> PathLight<K> {
     fn add(&mut self, lighting: &Lighting<'_>, contribution: &Contribution<K>) {
         let values = contribution.values.map(|value| value.to_array().map(f64::from));
         let sums = match lighting {
-            Lighting::Apart(groups) => {
-                let group = groups.of(contribution.light);
-                self.touch(group);
-                &mut self.sums[group]
+            Lighting::Apart => {
+                let LightIndex(picture) = contribution.light;
+                if !self.touched.contains(&picture) {
+                    self.touched.push(picture);
+                }
+                &mut self.sums[picture]
             }
             Lighting::Mixed(_) => self.of_light(contribution.light),
         };
@@ -498,23 +476,16 @@ impl<const K: usize> PathLight<K> {
         self.lights.clear();
     }
 
-    fn touch(&mut self, picture: usize) {
-        if !self.touched.contains(&picture) {
-            self.touched.push(picture);
-        }
-    }
-
     fn clear(&mut self) {
-        for group in self.touched.drain(..) {
-            self.sums[group] = [[0.0; 3]; K];
+        for picture in self.touched.drain(..) {
+            self.sums[picture] = [[0.0; 3]; K];
         }
     }
 }
 
 impl<const K: usize> Part<K> {
-    fn new(window: Window, groups: usize) -> Self {
-        let area = window.area();
-        Self { window, sums: vec![[[0.0; 3]; K]; area * groups], counts: vec![0; area] }
+    fn new(window: Window, pictures: usize) -> Self {
+        Self { sums: vec![[[0.0; 3]; K]; window.area() * pictures], window }
     }
 
     /// The index within the rectangle of the pixel that contains (x, y), or `None` outside.
@@ -527,24 +498,22 @@ impl<const K: usize> Part<K> {
     }
 
     fn add(&mut self, pixel: usize, found: &PathLight<K>, weight: f64) {
-        self.counts[pixel] += 1;
         let first = pixel * found.sums.len();
-        for &group in &found.touched {
-            let pairs = self.sums[first + group].iter_mut().zip(found.sums[group]);
+        for &picture in &found.touched {
+            let pairs = self.sums[first + picture].iter_mut().zip(found.sums[picture]);
             pairs.for_each(|(sum, value)| add(sum, value, weight));
         }
     }
 
     /// Adds the rectangle to its view. A pixel receives few rectangles, always in the order of the tiles.
-    fn merge_into(&self, films: &mut [HalfLight]) {
+    fn merge_into(&self, films: &mut [LightBasis]) {
         for (k, film) in films.iter_mut().enumerate() {
-            let groups = film.basis.pictures().len();
+            let pictures = film.pictures().len();
             for (place, [x, y]) in self.window.cells().enumerate() {
                 let (x, y) = (x as usize, y as usize);
-                film.counts.set(x, y, film.counts.get(x, y) + self.counts[place]);
-                for (group, picture) in film.basis.pictures_mut().iter_mut().enumerate() {
+                for (at, picture) in film.pictures_mut().iter_mut().enumerate() {
                     let mut pixel = picture.get(x, y);
-                    let sum = self.sums[place * groups + group][k];
+                    let sum = self.sums[place * pictures + at][k];
                     pixel.0.iter_mut().zip(sum).for_each(|(pixel, sum)| *pixel += sum as f32);
                     picture.set(x, y, pixel);
                 }

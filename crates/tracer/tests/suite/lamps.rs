@@ -10,7 +10,7 @@ use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use mateval_testkit::statistics::Renders;
-use mateval_tracer::{LightBasis, LightGroups, LightSampling, RenderSettings, Sampler, World, render, render_views};
+use mateval_tracer::{LightBasis, LightSampling, RenderSettings, Sampler, World, render, render_views};
 
 use super::estimators::{self, view, worst};
 
@@ -210,13 +210,13 @@ fn a_weighted_basis_is_a_render() {
         (0..3).for_each(|c| radiance[c] *= weights[0][c]);
         World::new(Arc::new(scene)).unwrap()
     };
-    let basis = |world: &World, groups: &LightGroups| -> LightBasis {
+    let basis = |world: &World| -> LightBasis {
         let views = [view(), view().turned(5.0, -5.0)];
-        let mut done = render_views(world, &views, groups, &settings(8, 0), &[5], &|_, _| ()).unwrap();
-        done.views.remove(1).halves.remove(0).basis
+        let mut done = render_views(world, &views, &settings(8, 0), &[5], &|_, _| ()).unwrap();
+        done.views.remove(1).halves.remove(0)
     };
-    let apart = basis(&lit([[1.0; 3]; 2]), &LightGroups::apart(2));
-    let direct = basis(&lit([[0.2, 0.5, 3.0], [0.7; 3]]), &LightGroups::together(2)).sum();
+    let apart = basis(&lit([[1.0; 3]; 2]));
+    let direct = basis(&lit([[0.2, 0.5, 3.0], [0.7; 3]])).sum();
     let difference = |weights: &[[f64; 3]]| {
         let weighted = apart.weighted(weights).unwrap();
         let channels = |p: &Picture<LinearRgb>| p.pixels().iter().flat_map(|v| v.0).collect::<Vec<f32>>();
