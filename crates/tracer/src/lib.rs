@@ -12,7 +12,7 @@
 //! 1. [`World`] checks the scene, builds the bounding volume hierarchy ([`Accel`]) and prepares lights and materials.
 //! 2. [`Sampler`] derives every random number from seed, pixel and sample index.
 //! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
-//! 4. The material at that place becomes a [`Bsdf`]; [`emitter`] samples a light; the BSDF samples the next ray.
+//! 4. The material at that place becomes a BSDF ([`bsdf`]); [`emitter`] samples a light; the BSDF samples the next ray.
 //! 5. [`render`](mod@render) averages the samples of each tile in a fixed order.
 //! 6. [`noise_filter`] takes the noise out of a picture that people, SSIM or LPIPS see.
 //!
@@ -36,7 +36,6 @@ pub mod split;
 pub mod world;
 
 pub use accel::Accel;
-pub use bsdf::{Bsdf, BsdfSample};
 pub use emitter::StageLight;
 pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
 pub use light_basis::LightBasis;

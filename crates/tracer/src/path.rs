@@ -103,7 +103,7 @@ impl<'w, const K: usize> MaterialSource<'w, K> for OwnMaterials<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
-        self.0.bsdf_of_colors(place, wo)
+        self.0.bsdf(place, wo)
     }
 }
 
@@ -328,7 +328,7 @@ fn sample_light<const K: usize>(
     let [a, b, c, _] = path.sampler.set(1 + 2 * scatterings);
     let light = world.emitters().sample(place.position, [a, b, c], |place| world.opacity_at(place))?;
     let part = if light.on_stage { BsdfPart::Stage } else { BsdfPart::All };
-    let (values, density) = bsdf.evaluate_all(light.direction, part);
+    let (values, density) = bsdf.evaluate(light.direction, part);
     if values == [Vec3::ZERO; K] {
         return None;
     }

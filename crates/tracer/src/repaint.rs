@@ -19,7 +19,8 @@ use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
 use crate::error::{RequestFault, TracerError};
 use crate::path::{MOST_VARIANTS, MaterialSource, RenderSettings};
 use crate::ray::{Hit, SurfaceHit};
-use crate::shared_centre::{Lighting, Progress, Subject, ViewsJob, ViewsRender};
+use crate::render::Progress;
+use crate::shared_centre::{Lighting, Subject, ViewsJob, ViewsRender};
 use crate::world::World;
 
 /// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when
@@ -28,10 +29,7 @@ use crate::world::World;
 pub struct Coat {
     /// One per prediction; lookups return linear values.
     pub base_colors: Vec<Texture>,
-    /// Perceptual roughness, in the first channel.
-    pub roughness: Texture,
-    /// Metallic, in the first channel.
-    pub metallic: Texture,
+    pub scattering: Scattering,
 }
 
 /// The maps of one surface that decide in which directions light scatters.
@@ -124,12 +122,12 @@ impl Repaint {
     }
 
     /// The material of `base_color` with these maps at `uv`.
-    fn principled(&self, base_color: Vec3, [roughness, metallic]: [&Texture; 2], uv: Vec2) -> Principled<'_> {
+    fn principled(&self, base_color: Vec3, maps: &Scattering, uv: Vec2) -> Principled<'_> {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
         Principled {
             base_color,
-            roughness: scalar(roughness),
-            metallic: scalar(metallic),
+            roughness: scalar(&maps.roughness),
+            metallic: scalar(&maps.metallic),
             eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
         }
@@ -147,7 +145,8 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
         let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
         if let Some(coat) = &self.repaint.coats[place.surface.0] {
             let colors = coat.base_colors[self.first..].iter().take(K);
-            for texture in colors.chain([&coat.roughness, &coat.metallic]) {
+            let Scattering { roughness, metallic } = &coat.scattering;
+            for texture in colors.chain([roughness, metallic]) {
                 texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
             }
         }
@@ -155,15 +154,14 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
-        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf_of_colors(place, wo) };
+        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf(place, wo) };
         let base_colors = self.repaint.base_colors(coat, self.first, uv);
         let principled = |maps| self.repaint.principled(base_colors[0], maps, uv);
         let second = self.repaint.second.as_ref().and_then(|second| {
-            let Scattering { roughness, metallic } = second.of_surface[place.surface.0].as_ref()?;
-            Some((principled([roughness, metallic]), second.from.saturating_sub(self.first)))
+            let maps = second.of_surface[place.surface.0].as_ref()?;
+            Some((principled(maps), second.from.saturating_sub(self.first)))
         });
-        let first = principled([&coat.roughness, &coat.metallic]);
-        Bsdf::of_principled(first, second, &base_colors, place, wo)
+        Bsdf::of_principled(principled(&coat.scattering), second, &base_colors, place, wo)
     }
 }
 

@@ -178,7 +178,7 @@ impl World {
     }
 
     /// Whether the nearest surface that is not wholly transparent is not wholly opaque either.
-    pub fn meets_fractional_opacity(&self, ray: &Ray) -> bool {
+    pub(crate) fn meets_fractional_opacity(&self, ray: &Ray) -> bool {
         if !self.masked {
             return false;
         }
@@ -220,7 +220,7 @@ impl World {
     }
 
     /// The opacity at a hit; 1 if the material has none.
-    pub fn opacity(&self, hit: &Hit) -> f32 {
+    pub(crate) fn opacity(&self, hit: &Hit) -> f32 {
         match &self.material_of(hit.surface).opacity {
             None => 1.0,
             Some(opacity) => opacity.at(&self.textures, self.source_uv(hit)),
@@ -228,7 +228,7 @@ impl World {
     }
 
     /// The opacity at a place; 1 if the material has none.
-    pub fn opacity_at(&self, place: &SurfaceHit) -> f32 {
+    pub(crate) fn opacity_at(&self, place: &SurfaceHit) -> f32 {
         self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
     }
 
@@ -251,13 +251,8 @@ impl World {
         SurfaceHit::new(hit.surface, hit.triangle, &self.records[hit.global as usize], hit.barycentrics)
     }
 
-    /// The BSDF of the surface's own material at `hit`, seen from `wo`.
-    pub fn bsdf(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_> {
-        self.bsdf_of_colors(hit, wo)
-    }
-
-    /// [`Self::bsdf`] for `K` material variants, all the same.
-    pub(crate) fn bsdf_of_colors<const K: usize>(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_, K> {
+    /// The BSDF of the surface's own material at `hit`, seen from `wo`, the same for all `K` variants.
+    pub(crate) fn bsdf<const K: usize>(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_, K> {
         let surface = &self.scene.surfaces[hit.surface.0];
         let index = surface.material.0;
         let (material, table) = (&self.scene.materials[index], self.tables.of(index));

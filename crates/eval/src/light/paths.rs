@@ -100,7 +100,10 @@ impl Paths<'_> {
         let coat = |surface: usize| {
             let PredictedMaterial { roughness, metallic, .. } = first.materials[surface].clone()?;
             let base_colors = all.iter().map(|scene| Some(scene.materials[surface].as_ref()?.base_color.clone()));
-            Some(Coat { base_colors: base_colors.collect::<Option<_>>()?, roughness, metallic })
+            Some(Coat {
+                base_colors: base_colors.collect::<Option<_>>()?,
+                scattering: Scattering { roughness, metallic },
+            })
         };
         let coats: Vec<Option<Coat>> = (0..self.atlases.len()).map(coat).collect();
         let repaint = Repaint::new(self.world, self.atlases, coats, self.rules.flavour)?;

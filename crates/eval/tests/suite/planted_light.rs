@@ -15,7 +15,7 @@ use mateval_light::light_stage::{self, NamedLight};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
-    Coat, LightBasis, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
+    Coat, LightBasis, LightMix, Lighting, RenderSettings, Repaint, Scattering, StageLight, World, render_repainted,
 };
 
 use super::sample::{dataset, hasty, write_truth};
@@ -60,8 +60,7 @@ fn basis_of(
     let coat = |surface: usize| {
         prediction.materials[surface].as_ref().map(|material| Coat {
             base_colors: vec![material.base_color.clone()],
-            roughness: material.roughness.clone(),
-            metallic: material.metallic.clone(),
+            scattering: Scattering { roughness: material.roughness.clone(), metallic: material.metallic.clone() },
         })
     };
     let repaint = Repaint::new(world, atlases, (0..atlases.len()).map(coat).collect(), flavour()).unwrap();

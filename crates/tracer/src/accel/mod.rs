@@ -112,7 +112,12 @@ impl Accel {
     }
 
     /// [`Self::closest_where`] for many rays at once. `accept` also gets the index of the ray.
-    pub(crate) fn closest_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, hits: &mut Vec<Option<Hit>>) {
+    pub(crate) fn closest_many_where(
+        &self,
+        rays: &[Ray],
+        accept: impl Fn(usize, &Hit) -> bool,
+        hits: &mut Vec<Option<Hit>>,
+    ) {
         self.closest_of_candidates(rays, |which, found| accept(which, &self.hit(found)), hits);
     }
 
@@ -122,7 +127,12 @@ impl Accel {
     }
 
     /// [`Self::occluded_where`] for many rays at once. `accept` also gets the index of the ray.
-    pub(crate) fn occluded_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, occluded: &mut Vec<bool>) {
+    pub(crate) fn occluded_many_where(
+        &self,
+        rays: &[Ray],
+        accept: impl Fn(usize, &Hit) -> bool,
+        occluded: &mut Vec<bool>,
+    ) {
         self.any_of_candidates(rays, |which, found| accept(which, &self.hit(found)), occluded);
     }
 

@@ -9,7 +9,6 @@
 mod plane;
 
 use std::array::from_fn;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3, Vec3};
 use mateval_dataset::Camera;
@@ -21,7 +20,7 @@ use crate::error::{RequestFault, TracerError};
 use crate::light_basis::LightBasis;
 use crate::path::{MaterialSource, OwnMaterials, PathCounts, PathTracer, RenderSettings};
 use crate::ray::Ray;
-use crate::render::{self, RenderStats};
+use crate::render::{self, Progress, RenderStats};
 use crate::sampling::Sampler;
 use crate::world::World;
 use plane::{Numbering, Plane, PlaneView, Window, cell_points};
@@ -104,24 +103,6 @@ pub(crate) struct ViewsJob<'a, M> {
     pub(crate) seeds: &'a [u64],
 }
 
-/// Counts finished tiles and reports them.
-pub(crate) struct Progress<'a> {
-    finished: AtomicUsize,
-    total: usize,
-    report: &'a (dyn Fn(usize, usize) + Sync),
-}
-
-impl<'a> Progress<'a> {
-    /// `report` is called with the number of finished tiles and `total`.
-    pub(crate) fn new(total: usize, report: &'a (dyn Fn(usize, usize) + Sync)) -> Self {
-        Self { finished: AtomicUsize::new(0), total, report }
-    }
-
-    fn advance(&self) {
-        (self.report)(self.finished.fetch_add(1, Ordering::Relaxed) + 1, self.total);
-    }
-}
-
 impl<'a, M: Copy> ViewsJob<'a, M> {
     /// Checks the arguments, for `variants` material variants, and returns the planes to expose.
     pub(crate) fn planes(&self, variants: usize) -> Result<Vec<SharedPlane>, TracerError> {
@@ -141,7 +122,6 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     where
         M: MaterialSource<'a, K> + Sync,
     {
-        let done = || progress.advance();
         let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
         let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.subject.variants];
         let mut counts = Vec::new();
@@ -149,7 +129,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         for &seed in self.seeds {
             let settings = RenderSettings { seed, ..*self.settings };
             for shared in planes {
-                let of_views = expose::<_, K>(self.subject, &shared.plane, &settings, &mut counts, &done);
+                let of_views = expose::<_, K>(self.subject, &shared.plane, &settings, &mut counts, progress);
                 for (view, halves) in shared.views.iter().zip(of_views) {
                     for (views, half) in views.iter_mut().zip(halves) {
                         views[*view].halves.push(half);
@@ -158,10 +138,8 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
             }
         }
         // Attach the counts of each variant.
-        let of_variant = |(variant, views): (usize, Vec<ViewLight>)| ViewsRender {
-            views,
-            stats: stats(&counts, variant),
-        };
+        let of_variant =
+            |(variant, views): (usize, Vec<ViewLight>)| ViewsRender { views, stats: stats(&counts, variant) };
         views.into_iter().enumerate().map(of_variant).collect()
     }
 }
@@ -255,7 +233,7 @@ fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
     plane: &Plane,
     settings: &RenderSettings,
     counts: &mut Vec<TileCounts>,
-    done: &(impl Fn() + Sync),
+    progress: &Progress<'_>,
 ) -> Vec<Vec<LightBasis>> {
     let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
     let mut films = exposure.blank_films();
@@ -265,7 +243,7 @@ fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
             .par_iter()
             .map(|tile| {
                 let exposed = exposure.tile(tile);
-                done();
+                progress.advance();
                 exposed
             })
             .collect();

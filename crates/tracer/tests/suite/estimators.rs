@@ -13,7 +13,7 @@ use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture, Surfac
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
 use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use mateval_testkit::statistics::{Renders, chi_square_z};
+use mateval_testkit::statistics::{Renders, counts_z};
 use mateval_tracer::{Accel, LightBasis, LightSampling, Ray, RenderSettings, Sampler, World, render, render_views};
 use sha2::{Digest, Sha256};
 
@@ -188,8 +188,7 @@ fn light_density(world: &World, from: Vec3) -> Vec<f64> {
     cells
 }
 
-/// The deviation of light samples from `expected`, as a standard normal (Wilson and Hilferty). Samples that find
-/// nothing (backs of lamps) and cells with fewer than 10 expected samples are pooled.
+/// The deviation of light samples from `expected`, as a standard normal. Samples of the backs of lamps find nothing.
 fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
     const COUNT: u32 = 40_000;
     let mut found = vec![0.0_f64; ROWS * COLUMNS];
@@ -203,19 +202,7 @@ fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
         let row = (((d.z + 1.0) * 0.5 * ROWS as f32) as usize).min(ROWS - 1);
         found[row * COLUMNS + column] += 1.0;
     }
-    let n = f64::from(COUNT);
-    let rest = [n - found.iter().sum::<f64>(), n * (1.0 - expected.iter().sum::<f64>())];
-    let (mut statistic, mut freedom, mut pooled) = (0.0, 0.0, rest);
-    for (found, expected) in found.iter().zip(expected) {
-        if n * expected >= 10.0 {
-            statistic += (found - n * expected).powi(2) / (n * expected);
-            freedom += 1.0;
-        } else {
-            pooled = [pooled[0] + found, pooled[1] + n * expected];
-        }
-    }
-    statistic += (pooled[0] - pooled[1]).powi(2) / pooled[1].max(10.0);
-    chi_square_z(statistic / freedom, freedom)
+    counts_z(&found, expected, COUNT)
 }
 
 #[test]

@@ -7,7 +7,9 @@ use mateval_dataset::material::{ColorInput, MaterialModel, PrincipledFlavour, Sc
 use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_tracer::{Coat, LightBasis, LightMix, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World};
+use mateval_tracer::{
+    Coat, LightBasis, LightMix, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World,
+};
 use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_views};
 
 use super::estimators::worst;
@@ -21,13 +23,16 @@ fn flat(value: [f32; 3]) -> Texture {
     Texture::new(1, 1, Texels::Linear(vec![value]), Wrap::Clamp).unwrap()
 }
 
+fn scattering(roughness: f32, metallic: f32) -> Scattering {
+    Scattering { roughness: flat([roughness; 3]), metallic: flat([metallic; 3]) }
+}
+
 /// One coat with these colours on all walls and lamps; the metal sphere keeps its own material.
 fn coats(scene: &ReferenceScene, colors: &[[f32; 3]], roughness: f32, metallic: f32) -> Vec<Option<Coat>> {
     let coat = |mesh: &TriangleMesh| {
         mesh.uvs.as_ref().map(|_| Coat {
             base_colors: colors.iter().map(|color| flat(*color)).collect(),
-            roughness: flat([roughness; 3]),
-            metallic: flat([metallic; 3]),
+            scattering: scattering(roughness, metallic),
         })
     };
     scene.surfaces.iter().map(|surface| coat(&surface.mesh)).collect()
@@ -95,8 +100,11 @@ fn two_roughnesses_share_paths_without_bias() {
         Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap()
     };
     let second = |(roughness, metallic): (f32, f32)| -> Vec<Option<Scattering>> {
-        let scattering = Scattering { roughness: flat([roughness; 3]), metallic: flat([metallic; 3]) };
-        scene.surfaces.iter().map(|surface| surface.mesh.uvs.as_ref().map(|_| scattering.clone())).collect()
+        scene
+            .surfaces
+            .iter()
+            .map(|surface| surface.mesh.uvs.as_ref().map(|_| scattering(roughness, metallic)))
+            .collect()
     };
     let renders = |repaint: &Repaint, first_seed: u64| -> Vec<Renders> {
         let settings = RenderSettings { samples: 64, ..Default::default() };
