@@ -136,13 +136,7 @@ pub fn camera(position: [f64; 3], target: [f64; 3], size: u32, fov_deg: f64) -> 
 pub const WALLS: [usize; 4] = [2, 3, 4, 5];
 
 pub fn box_quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
-    let (corner, u, v) = (Vec3::from(corner), Vec3::from(u), Vec3::from(v));
-    TriangleMesh {
-        positions: vec![corner, corner + u, corner + u + v, corner + v],
-        uvs: Some(vec![Vec2::ZERO; 4]),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Default::default()
-    }
+    TriangleMesh { uvs: Some(vec![Vec2::ZERO; 4]), ..quad(corner.into(), u.into(), v.into()) }
 }
 
 /// Floor, ceiling, walls at x = 0 and 4 and at z = 0 and 6, then `more`; all of one grey.
@@ -157,12 +151,10 @@ pub fn box_room(more: Vec<TriangleMesh>) -> ReferenceScene {
         box_quad([0.0, 0.0, 6.0], x, y),
     ];
     meshes.extend(more);
-    let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-    let material = Material::new("", model);
     let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
     ReferenceScene {
         surfaces: meshes.into_iter().map(surface).collect(),
-        materials: vec![material],
+        materials: vec![grey(0.5)],
         ..Default::default()
     }
 }

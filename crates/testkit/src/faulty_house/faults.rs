@@ -127,6 +127,7 @@ fn plant_in_json(house: &mut Value, name: &str, pointer: &str) {
     let remove = |house: &mut Value, key: &str| {
         house.pointer_mut(pointer).unwrap().as_object_mut().unwrap().remove(key).unwrap();
     };
+    let before = house.pointer(pointer).cloned();
     match name {
         "furniture_uid_repeated" => {
             let mut again = house["furniture"][21].clone();
@@ -164,9 +165,10 @@ fn plant_in_json(house: &mut Value, name: &str, pointer: &str) {
         // One triangle names a vertex twice, the other has two vertices at one position.
         "mesh_zero_area" => list(house, pointer).extend([0, 0, 1, 2, 3, 4].map(Value::from)),
         // Sound houses have these too.
-        "valid_false" | "material_jid_local" | "room_without_ceiling" => {}
+        "valid_false" | "material_jid_local" | "room_without_ceiling" => return,
         _ => *house.pointer_mut(pointer).unwrap() = faulty_value(name),
     }
+    assert!(name == "model_folder_missing" || house.pointer(pointer) != before.as_ref(), "{name} changes nothing");
 }
 
 /// A mesh's positions moved by one along z, which some walls of the data have as normals.
@@ -215,7 +217,9 @@ pub(super) fn damage_files(house: &House, root: &Path) {
             }
             _ => {
                 let text = std::fs::read_to_string(&path).unwrap();
-                std::fs::write(&path, damaged_text(fault.name, &text)).unwrap();
+                let damaged = damaged_text(fault.name, &text);
+                assert!(fault.name == "model_flat" || damaged != text, "{} changes nothing", fault.name);
+                std::fs::write(&path, damaged).unwrap();
             }
         }
     }
