@@ -11,7 +11,7 @@ use mateval_dataset::{SceneId, glb, reference};
 use mateval_eval::truth::true_material;
 use mateval_image::{LinearRgb, Picture};
 use mateval_prep::conversion::is_scored_model;
-use mateval_tracer::{Coat, Lighting, RenderSettings, Repaint, World, render_repainted, render_views};
+use mateval_tracer::{Coat, Lighting, RenderSettings, Repaint, Scattering, World, render_repainted, render_views};
 use serde_json::Value;
 
 use super::blender::blender;
@@ -56,7 +56,8 @@ fn the_maps_describe_a_surface_completely() {
     let coat = |instance: &mateval_dataset::dataset::Instance| {
         let size = instance.atlas.as_ref()?.size as usize;
         let truth = true_material(&folder, &instance.id, size).unwrap();
-        Some(Coat { base_colors: vec![truth.base_color], roughness: truth.roughness, metallic: truth.metallic })
+        let scattering = Scattering { roughness: truth.roughness, metallic: truth.metallic };
+        Some(Coat { base_colors: vec![truth.base_color], scattering })
     };
     let coats = scene.instances.iter().map(coat).collect();
     let repaint = Repaint::new(&world, &atlases, coats, PrincipledFlavour::Blender).unwrap();

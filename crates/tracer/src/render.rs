@@ -42,44 +42,6 @@ pub struct Render {
 ///
 /// The bytes of the picture are the same for any number of threads in the current rayon pool. Fails if a setting is out
 /// of range.
-///
-/// # Examples
-///
-/// A grey wall in uniform light of radiance 1 reflects half of it:
-///
-/// ```
-/// use std::sync::Arc;
-///
-/// use glam::{DVec3, Vec3};
-/// use mateval_dataset::material::{ColorInput, Material, MaterialModel};
-/// use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface};
-/// use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
-/// use mateval_tracer::{RenderSettings, World, render};
-///
-/// let mesh = TriangleMesh {
-///     positions: vec![Vec3::new(-9.0, -9.0, -2.0), Vec3::new(9.0, -9.0, -2.0), Vec3::new(0.0, 9.0, -2.0)],
-///     triangles: vec![[0, 1, 2]],
-///     ..Default::default()
-/// };
-/// let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-/// let grey = Material { name: "grey".into(), model, two_sided: true, opacity: None, bump: None };
-/// let sky = Emission::Constant { radiance: [1.0; 3] };
-/// let world = World::new(Arc::new(ReferenceScene {
-///     surfaces: vec![Surface { name: "wall".into(), mesh, material: MaterialIndex(0) }],
-///     materials: vec![grey],
-///     lights: vec![LightGroup { name: "sky".into(), emission: sky, camera_visible: true }],
-///     ..Default::default()
-/// }))?;
-///
-/// let intrinsics = Intrinsics::from_fov_x(8, 8, 0.5);
-/// let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
-/// let settings = RenderSettings { samples: 16, ..Default::default() };
-/// let picture = render(&world, &camera, &settings, &|_finished, _total| ())?.picture;
-///
-/// let mean = picture.pixels().iter().map(|pixel| pixel.0[0]).sum::<f32>() / 64.0;
-/// assert!((mean - 0.5).abs() < 0.02, "{mean}");
-/// # Ok::<(), mateval_tracer::TracerError>(())
-/// ```
 pub fn render(
     world: &World,
     camera: &Camera,

@@ -256,6 +256,8 @@ fn bad_scenes_are_refused() {
     refused(|s| s.surfaces[1].material.0 = 99, "surface 1");
     refused(|s| s.surfaces[2].mesh.uvs = Some(vec![]), "surface 2");
     refused(|s| s.surfaces[2].mesh.normals = Some(vec![Vec3::NAN; 4]), "surface 2");
+    refused(|s| s.surfaces[1].mesh.positions[2] = Vec3::INFINITY, "invalid scene: surface 1: vertex 2");
+    refused(|s| s.surfaces[2].mesh.positions[3].y = f32::NAN, "surface 2: vertex 3");
     refused(|s| s.surfaces[3].mesh = TriangleMesh { triangles: vec![[7, 0, 1]], ..Default::default() }, "surface 3");
     refused(|s| s.lights[0].emission = Emission::Constant { radiance: [f32::NAN; 3] }, "light 0");
     refused(|s| s.lights.push(s.lights[0].clone()), "light 2");
