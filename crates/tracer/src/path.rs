@@ -116,6 +116,7 @@ const STRAIGHT: f32 = 0.9999;
 /// Events counted along paths.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathCounts {
+    pub(crate) paths: u64,
     pub(crate) rays: u64,
     pub(crate) shadow_rays: u64,
     pub(crate) capped: u64,
@@ -215,6 +216,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             self.paths.push(Path { which, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
             self.rays.push(ray);
         }
+        self.counts.paths += self.paths.len() as u64;
         let mut scatterings = 0;
         while !self.paths.is_empty() {
             self.arrive(scatterings, &mut add);

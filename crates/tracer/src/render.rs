@@ -69,8 +69,7 @@ pub fn render(
         }
         counts.push(of_tile);
     }
-    let paths = (width * height) as u64 * u64::from(settings.samples);
-    Ok(Render { picture, stats: stats(paths, &counts, 0) })
+    Ok(Render { picture, stats: stats(&counts, 0) })
 }
 
 /// The mean of each pixel's samples. A batch of paths holds one path per pixel.
@@ -100,9 +99,10 @@ pub(crate) fn camera_start(camera: &Camera, seed: u64, [x, y]: [usize; 2], index
 }
 
 /// Sums the counts of all tiles, for one of the variants that share the paths.
-pub(crate) fn stats(paths: u64, tiles: &[PathCounts], variant: usize) -> RenderStats {
+pub(crate) fn stats(tiles: &[PathCounts], variant: usize) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
     let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[variant]).sum();
+    let paths = sum(|tile| tile.paths);
     let all = paths.max(1) as f64;
     RenderStats {
         paths,

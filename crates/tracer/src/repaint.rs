@@ -20,7 +20,7 @@ use crate::error::{RequestFault, TracerError};
 use crate::path::{MOST_VARIANTS, MaterialSource, RenderSettings};
 use crate::ray::{Hit, SurfaceHit};
 use crate::render::Progress;
-use crate::shared_centre::{Lighting, Subject, ViewsJob, ViewsRender};
+use crate::shared_centre::{Lighting, ViewsJob, ViewsRender};
 use crate::world::World;
 
 /// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when
@@ -186,9 +186,8 @@ pub fn render_repainted(
         return Err(RequestFault::OtherWorld { found, expected }.into());
     }
     let job = |Range { start: first, end }: Range<usize>| {
-        let subject =
-            Subject { world, materials: Painted { world, repaint, first }, first, variants: end - first, lighting };
-        ViewsJob { subject, cameras, settings, seeds }
+        let (materials, variants) = (Painted { world, repaint, first }, end - first);
+        ViewsJob { world, materials, first, variants, lighting, cameras, settings, seeds }
     };
     let planes = job(0..0).planes(repaint.predictions)?;
     // Render the predictions in rounds that share their paths.

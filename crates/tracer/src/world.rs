@@ -66,8 +66,7 @@ impl World {
         // Rays read large textures and triangle records at random: keep them on huge pages.
         let texels = textures.iter().map(Texture::bytes);
         texels.filter(|bytes| bytes.len() >= SMALL_TEXTURE).for_each(move_to_huge_pages);
-        let [low, high] = accel.bounds();
-        let size = low.abs().max(high.abs()).max_element();
+        let size = accel.size;
         let records: Vec<TriangleRecord> = meshes(&scene)
             .into_par_iter()
             .flat_map_iter(|mesh| {
@@ -106,9 +105,7 @@ impl World {
     /// The same surfaces and materials, lit only by stage lights: the scene's own lamps no longer emit. Light group k
     /// is `stage[k]`. Fails if a light has no triangles, or a number is not finite.
     pub fn on_stage(&self, stage: &[StageLight]) -> Result<Self, TracerError> {
-        let [low, high] = self.accel.bounds();
-        let size = low.abs().max(high.abs()).max_element();
-        let emitters = Emitters::on_stage(stage, self.scene.surfaces.len(), size)?;
+        let emitters = Emitters::on_stage(stage, self.scene.surfaces.len(), self.accel.size)?;
         Ok(Self { emitters, ..self.clone() })
     }
 
@@ -241,7 +238,7 @@ impl World {
     }
 
     /// The surface's own uv at a hit; zero if it has none.
-    pub fn source_uv(&self, hit: &Hit) -> Vec2 {
+    fn source_uv(&self, hit: &Hit) -> Vec2 {
         let [a, b, c] = self.records[hit.global as usize].uvs;
         a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
     }

@@ -45,7 +45,7 @@ pub struct Accel {
     wide: Option<Wide>,
     bounds: [Vec3; 2],
     /// The largest absolute coordinate.
-    size: f32,
+    pub(crate) size: f32,
     /// For each surface the number of triangles before it, then the total.
     starts: Vec<u32>,
     instructions: Instructions,

@@ -35,9 +35,10 @@ pub(crate) struct BlenderTables {
     facets: &'static FacetTables,
     /// See [`Self::rise`]; roughness varies fastest.
     rise: Grid<COARSE>,
-    f0: f32,
-    /// The mean Fresnel term of light between facets.
-    mean: f32,
+    /// The reflectance at normal incidence.
+    pub(crate) f0: f32,
+    /// The Fresnel term averaged over all directions, weighted by their cosine.
+    pub(crate) mean_fresnel: f32,
 }
 
 /// The tables that do not depend on the index.
@@ -72,7 +73,7 @@ impl BlenderTables {
         let f0 = f0_from_eta(eta);
         let mean = ((mean_fresnel(eta) - f0) / (1.0 - f0)).clamp(0.0, 1.0);
         let facets = FACETS.get_or_init(FacetTables::new);
-        Self { facets, rise: rise(eta), f0, mean: f0 + (1.0 - f0) * mean }
+        Self { facets, rise: rise(eta), f0, mean_fresnel: f0 + (1.0 - f0) * mean }
     }
 
     /// The light that facets keep after one bounce from the cosine `cos`.
@@ -86,16 +87,6 @@ impl BlenderTables {
     /// from the cosine `cos`. Facets that reflect downwards count 0.
     pub(crate) fn rise(&self, roughness: f32, cos: f32) -> f32 {
         look_up(&self.rise, Step::new(roughness, COARSE), Step::new(cos, COARSE))
-    }
-
-    /// The reflectance at normal incidence.
-    pub(crate) fn f0(&self) -> f32 {
-        self.f0
-    }
-
-    /// The Fresnel term averaged over all directions, weighted by their cosine.
-    pub(crate) fn mean_fresnel(&self) -> f32 {
-        self.mean
     }
 }
 

@@ -68,8 +68,8 @@ pub fn render_views(
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ViewsRender, TracerError> {
-    let subject = Subject { world, materials: OwnMaterials(world), first: 0, variants: 1, lighting: Lighting::Apart };
-    let job = ViewsJob { subject, cameras, settings, seeds };
+    let (materials, lighting) = (OwnMaterials(world), Lighting::Apart);
+    let job = ViewsJob { world, materials, first: 0, variants: 1, lighting, cameras, settings, seeds };
     let planes = job.planes(1)?;
     let mut renders = job.render::<1>(&planes, &Progress::new(job.tiles(&planes), progress));
     Ok(renders.pop().expect("there is one variant"))
@@ -83,9 +83,8 @@ pub fn groups_with_one_centre(cameras: &[Camera]) -> Vec<Vec<usize>> {
     planes(cameras, 1).into_iter().map(|group| group.views).collect()
 }
 
-/// The scene to expose: a world with some materials and lighting.
-#[derive(Clone, Copy)]
-pub(crate) struct Subject<'a, M> {
+/// Views to be rendered, of a world with some materials and lighting.
+pub(crate) struct ViewsJob<'a, M> {
     pub(crate) world: &'a World,
     pub(crate) materials: M,
     /// The first of the material variants to trace.
@@ -93,11 +92,6 @@ pub(crate) struct Subject<'a, M> {
     /// The number of variants whose pictures are kept, at most `K`: the others only fill up the tracer's lanes.
     pub(crate) variants: usize,
     pub(crate) lighting: Lighting<'a>,
-}
-
-/// Views to be rendered.
-pub(crate) struct ViewsJob<'a, M> {
-    pub(crate) subject: Subject<'a, M>,
     pub(crate) cameras: &'a [Camera],
     pub(crate) settings: &'a RenderSettings,
     pub(crate) seeds: &'a [u64],
@@ -107,7 +101,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     /// Checks the arguments, for `variants` material variants, and returns the planes to expose.
     pub(crate) fn planes(&self, variants: usize) -> Result<Vec<SharedPlane>, TracerError> {
         self.settings.check()?;
-        self.subject.lighting.check(self.subject.world.emitters().groups(), variants)?;
+        self.lighting.check(self.world.emitters().groups(), variants)?;
         check_seeds(self.seeds)?;
         Ok(planes(self.cameras, self.settings.samples))
     }
@@ -123,13 +117,13 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         M: MaterialSource<'a, K> + Sync,
     {
         let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
-        let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.subject.variants];
+        let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.variants];
         let mut counts = Vec::new();
         // Expose every plane once per seed.
         for &seed in self.seeds {
             let settings = RenderSettings { seed, ..*self.settings };
             for shared in planes {
-                let of_views = expose::<_, K>(self.subject, &shared.plane, &settings, &mut counts, progress);
+                let of_views = expose::<_, K>(self, &shared.plane, &settings, &mut counts, progress);
                 for (view, halves) in shared.views.iter().zip(of_views) {
                     for (views, half) in views.iter_mut().zip(halves) {
                         views[*view].halves.push(half);
@@ -139,7 +133,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         }
         // Attach the counts of each variant.
         let of_variant =
-            |(variant, views): (usize, Vec<ViewLight>)| ViewsRender { views, stats: stats(&counts, variant) };
+            |(variant, views): (usize, Vec<ViewLight>)| ViewsRender { views, stats: render::stats(&counts, variant) };
         views.into_iter().enumerate().map(of_variant).collect()
     }
 }
@@ -174,11 +168,6 @@ fn check_seeds(seeds: &[u64]) -> Result<(), RequestFault> {
         Some((_, seed)) => Err(RequestFault::RepeatedSeed(*seed)),
         None => Ok(()),
     }
-}
-
-fn stats(tiles: &[TileCounts], variant: usize) -> RenderStats {
-    let paths: Vec<PathCounts> = tiles.iter().map(|tile| tile.path).collect();
-    render::stats(tiles.iter().map(|tile| tile.paths).sum(), &paths, variant)
 }
 
 impl Lighting<'_> {
@@ -216,26 +205,19 @@ fn check_mix(mix: &LightMix, lights: usize) -> Result<(), RequestFault> {
     Ok(())
 }
 
-/// Counts of what happened in one tile.
-#[derive(Clone, Copy, Debug, Default)]
-struct TileCounts {
-    paths: u64,
-    path: PathCounts,
-}
-
 /// Tiles exposed per thread before they are merged. More tiles keep threads busier at the end of a batch and take more
 /// memory.
 const TILES_A_THREAD: usize = 4;
 
 /// Exposes all views of `plane` with the seed of `settings`, per variant. Appends the counts of each tile to `counts`.
 fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
-    subject: Subject<'w, M>,
+    job: &ViewsJob<'w, M>,
     plane: &Plane,
     settings: &RenderSettings,
-    counts: &mut Vec<TileCounts>,
+    counts: &mut Vec<PathCounts>,
     progress: &Progress<'_>,
 ) -> Vec<Vec<LightBasis>> {
-    let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
+    let exposure = Exposure { job, plane, settings, numbering: Numbering::new(plane.most_paths()) };
     let mut films = exposure.blank_films();
     // Tiles are merged in their own order, whichever finishes first; batches limit how many wait in memory.
     for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
@@ -258,7 +240,7 @@ fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
 }
 
 struct Exposure<'w, 'a, M> {
-    subject: Subject<'w, M>,
+    job: &'a ViewsJob<'w, M>,
     plane: &'a Plane,
     settings: &'a RenderSettings,
     numbering: Numbering,
@@ -267,7 +249,7 @@ struct Exposure<'w, 'a, M> {
 /// The contribution of a tile to every view that sees some of it.
 struct ExposedTile<const K: usize> {
     parts: Vec<Option<Part<K>>>,
-    counts: TileCounts,
+    counts: PathCounts,
 }
 
 /// A rectangle of one view: sums for all its pictures, pixel by pixel and variant by variant.
@@ -317,14 +299,14 @@ struct PathLight<const K: usize> {
 
 impl<'w, M: Copy> Exposure<'w, '_, M> {
     fn pictures(&self) -> usize {
-        self.subject.lighting.pictures(self.subject.world.emitters().groups())
+        self.job.lighting.pictures(self.job.world.emitters().groups())
     }
 
     fn blank_films(&self) -> Vec<Vec<LightBasis>> {
         let blank = |PlaneView { intrinsics: k, .. }: &PlaneView| {
             LightBasis::black(k.width as usize, k.height as usize, self.pictures())
         };
-        self.plane.views().iter().map(|view| vec![blank(view); self.subject.variants]).collect()
+        self.plane.views.iter().map(|view| vec![blank(view); self.job.variants]).collect()
     }
 
     fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
@@ -332,8 +314,8 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
         M: MaterialSource<'w, K>,
     {
         let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.pictures()));
-        let parts = (0..self.plane.views().len()).map(part).collect();
-        let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
+        let parts = (0..self.plane.views.len()).map(part).collect();
+        let mut exposed = ExposedTile { parts, counts: PathCounts::default() };
         let mut tile_tracer = TileTracer::new(self);
         let mut points = Vec::new();
         for cell in tile.cells() {
@@ -346,12 +328,12 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
             }
         }
         tile_tracer.develop(&mut exposed);
-        exposed.counts.path = tile_tracer.tracer.counts;
+        exposed.counts = tile_tracer.tracer.counts;
         exposed
     }
 
     fn start(&self, path: &PlanePath) -> (Sampler, Ray) {
-        let camera = self.plane.camera();
+        let camera = &self.plane.camera;
         let direction = camera.direction(self.plane.ray_place(path.cell, path.point));
         let ray = Ray::endless(camera.position().as_vec3(), direction.as_vec3());
         (self.numbering.path_sampler(self.settings.seed, path.cell, path.rank), ray)
@@ -360,7 +342,7 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
     /// Adds the light of a path to the views that see it.
     fn splat<const K: usize>(&self, path: &PlanePath, found: &PathLight<K>, parts: &mut [Option<Part<K>>]) {
         let at = self.plane.ray_place(path.cell, path.point);
-        for (view, part) in self.plane.views().iter().zip(parts) {
+        for (view, part) in self.plane.views.iter().zip(parts) {
             let Some(part) = part else { continue };
             let Some(seen) = self.plane.seen(view, at) else { continue };
             if let Some(pixel) = part.pixel(seen.place.x, seen.place.y) {
@@ -372,7 +354,7 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
 
 impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> {
     fn new(exposure: &'a Exposure<'w, 'a, M>) -> Self {
-        let Subject { world, materials, .. } = exposure.subject;
+        let ViewsJob { world, materials, .. } = *exposure.job;
         Self {
             exposure,
             tracer: PathTracer::new(world, materials, *exposure.settings),
@@ -391,8 +373,7 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
         let Self { exposure, tracer, paths, contributions, found } = self;
         let starts = paths.iter().map(|path| exposure.start(path));
         tracer.trace(starts, |path, light, values| contributions.push(Contribution { path, light, values }));
-        let lighting = &exposure.subject.lighting;
-        let first = exposure.subject.first;
+        let ViewsJob { lighting, first, .. } = exposure.job;
         // Paths were traced together; the stable sort keeps the contributions of each path in their order.
         contributions.sort_by_key(|contribution| contribution.path);
         let mut rest = contributions.as_slice();
@@ -400,11 +381,10 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
             let (own, others) = rest.split_at(rest.partition_point(|contribution| contribution.path == which));
             rest = others;
             own.iter().for_each(|contribution| found.add(lighting, contribution));
-            found.mix(lighting, first);
+            found.mix(lighting, *first);
             exposure.splat(path, found, &mut exposed.parts);
             found.clear();
         }
-        exposed.counts.paths += paths.len() as u64;
         paths.clear();
         contributions.clear();
     }
