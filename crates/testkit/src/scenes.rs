@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_dataset::material::{ColorInput, Material, MaterialModel, TextureIndex, UvTransform};
+use mateval_dataset::material::{
+    ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
+    TextureIndex, UvTransform,
+};
 use mateval_dataset::reference::{
     Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
@@ -56,6 +59,27 @@ pub fn material(model: MaterialModel) -> Material {
 /// A grey Lambertian material.
 pub fn grey(reflectance: f32) -> Material {
     material(MaterialModel::Diffuse { reflectance: ColorInput::Constant([reflectance; 3]), alpha: None })
+}
+
+/// Constant parameters of the principled model.
+pub fn principled(color: [f32; 3], roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
+    MaterialModel::Principled {
+        base_color: ColorInput::Constant(color),
+        roughness: ScalarInput::Constant(roughness),
+        metallic: ScalarInput::Constant(metallic),
+        specular: 0.5,
+        flavour,
+    }
+}
+
+/// A copper-like metal, smooth or with GGX facets of this width.
+pub fn metal(alpha: Option<f32>) -> MaterialModel {
+    let facets = |alpha| Microfacets { distribution: Distribution::Ggx, alpha: ScalarInput::Constant(alpha) };
+    MaterialModel::Conductor {
+        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
+        specular_reflectance: ColorInput::Constant([1.0; 3]),
+        microfacets: alpha.map(facets),
+    }
 }
 
 /// Builds a scene step by step.

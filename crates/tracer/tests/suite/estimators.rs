@@ -7,25 +7,15 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use mateval_dataset::material::{
-    ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
+    ColorInput, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
 };
 use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture, SurfaceIndex};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
-use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::scenes::{Builder, camera, grey, material, metal, principled, quad, room, sphere};
 use mateval_testkit::statistics::{Renders, counts_z};
 use mateval_tracer::{Accel, LightBasis, LightSampling, Ray, RenderSettings, Sampler, World, render, render_views};
 use sha2::{Digest, Sha256};
-
-fn principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
-    MaterialModel::Principled {
-        base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
-        roughness: ScalarInput::Constant(roughness),
-        metallic: ScalarInput::Constant(metallic),
-        specular: 0.5,
-        flavour,
-    }
-}
 
 /// A room open to an environment map on one side, with a lamp, a large metal sphere, a rough plastic box and a frosted
 /// pane.
@@ -46,39 +36,34 @@ pub fn scene(brightness: f32) -> ReferenceScene {
         specular_transmittance: ColorInput::Constant([1.0; 3]),
         microfacets: facets,
     };
-    let metal = MaterialModel::Conductor {
-        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
-        specular_reflectance: ColorInput::Constant([1.0; 3]),
-        microfacets: facets,
-    };
+    let glossy = |roughness, metallic, flavour| material(principled([0.7, 0.5, 0.3], roughness, metallic, flavour));
     let mut builder = Builder::default();
     for (index, wall) in walls.into_iter().enumerate() {
         builder = match index {
-            0 => builder.surface(wall, material(principled(0.4, 0.0, PrincipledFlavour::Blender))),
+            0 => builder.surface(wall, glossy(0.4, 0.0, PrincipledFlavour::Blender)),
             2 => builder.surface(wall, material(plastic)),
             _ => builder.surface(wall, grey(0.6)),
         };
     }
-    let mut scene = builder
-        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal))
-        .surface(
-            sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12),
-            material(principled(0.3, 1.0, PrincipledFlavour::Mitsuba)),
-        )
+    let scene = builder
+        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal(Some(0.2))))
+        .surface(sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12), glossy(0.3, 1.0, PrincipledFlavour::Mitsuba))
         .surface(quad(Vec3::new(-0.9, -0.4, 0.3), Vec3::X * 0.6, Vec3::Y * 0.8), material(frosted))
         .surface(quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8), grey(0.0))
         .glowing([4.0 * brightness; 3])
         .scene();
+    under_sky(scene, brightness)
+}
+
+/// A scene without textures under a map with a bright spot.
+pub fn under_sky(mut scene: ReferenceScene, scale: f32) -> ReferenceScene {
     let texels = (0..16 * 8).map(|k| if k == 60 { [20.0; 3] } else { [0.3; 3] }).collect();
-    scene.textures.push(SourceTexture {
-        name: String::new(),
-        sha256: None,
-        texture: Texture::new(16, 8, Texels::Linear(texels), Wrap::Repeat).unwrap(),
-    });
+    let texture = Texture::new(16, 8, Texels::Linear(texels), Wrap::Repeat).unwrap();
+    scene.textures.push(SourceTexture { name: String::new(), sha256: None, texture });
     let world_from_environment = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let sky = Emission::Environment { texture: TextureIndex(0), scale: brightness, world_from_environment };
-    scene.lights.extend(Builder::default().light(sky).scene().lights);
-    scene
+    Builder::from(scene)
+        .light(Emission::Environment { texture: TextureIndex(0), scale, world_from_environment })
+        .scene()
 }
 
 pub fn view() -> Camera {
@@ -126,22 +111,17 @@ fn ways_of_sampling_agree() {
 /// other shares.
 #[test]
 fn directions_to_lights_follow_their_density() {
-    let mut scene = scene(1.0);
     // Only lamps and the map, so that nothing blocks light.
     let lamps = [
         quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8),
         quad(Vec3::new(-0.9, -0.2, -0.9), Vec3::Y * 0.5, Vec3::Z * 0.7),
         sphere(Vec3::new(0.6, -0.6, 0.3), 0.2, 10),
     ];
-    let map = scene.lights.pop().unwrap();
     let mut builder = Builder::default();
     for lamp in lamps {
         builder = builder.surface(lamp, grey(0.0)).glowing([1.0; 3]);
     }
-    let mut lit = builder.scene();
-    lit.textures = std::mem::take(&mut scene.textures);
-    lit.lights.push(map);
-    let world = World::new(Arc::new(lit)).unwrap();
+    let world = World::new(Arc::new(under_sky(builder.scene(), 1.0))).unwrap();
     let from = Vec3::new(0.1, 0.05, 0.2);
     let shared = world.with_group_shares(&view(), &[0.2, 5.0, 1.0, 1.0]);
     let [expected, elsewhere] = [from, from + Vec3::X * 0.1].map(|place| light_density(&world, place));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use mateval_dataset::material::{ColorInput, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_dataset::material::PrincipledFlavour;
 use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
@@ -14,7 +14,7 @@ use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_v
 
 use super::estimators::worst;
 use super::views::{lit_room, view};
-use mateval_testkit::scenes::{Builder, camera, grey, material, quad};
+use mateval_testkit::scenes::{Builder, camera, grey, material, principled, quad};
 use mateval_testkit::statistics::Renders;
 
 const COLORS: [[f32; 3]; 3] = [[0.6, 0.5, 0.4], [0.0, 0.9, 0.1], [1.0, 1.0, 1.0]];
@@ -46,13 +46,7 @@ fn atlases(scene: &ReferenceScene) -> Vec<TriangleMesh> {
 fn principled_room(color: [f32; 3], roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> ReferenceScene {
     let mut scene = lit_room([[1.0; 3]; 4]);
     for surface in scene.surfaces.iter().filter(|surface| surface.mesh.uvs.is_some()) {
-        scene.materials[surface.material.0] = material(MaterialModel::Principled {
-            base_color: ColorInput::Constant(color),
-            roughness: ScalarInput::Constant(roughness),
-            metallic: ScalarInput::Constant(metallic),
-            specular: 0.5,
-            flavour,
-        });
+        scene.materials[surface.material.0] = material(principled(color, roughness, metallic, flavour));
     }
     scene
 }
@@ -229,13 +223,7 @@ fn a_stage_lights_the_floor_and_hides_nothing() {
 /// stage, or as a surface of the scene.
 fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, staged: bool) -> f64 {
     let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
-    let model = MaterialModel::Principled {
-        base_color: ColorInput::Constant([color; 3]),
-        roughness: ScalarInput::Constant(roughness),
-        metallic: ScalarInput::Constant(metallic),
-        specular: 0.5,
-        flavour,
-    };
+    let model = principled([color; 3], roughness, metallic, flavour);
     let lamp = quad(Vec3::new(-0.5, 3.0, -0.5), Vec3::X, Vec3::Z);
     let camera = camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5);
     let builder = Builder::default().surface(floor, material(model));
@@ -275,13 +263,7 @@ fn metal_is_matt_on_a_stage() {
 
 /// A room of matt walls with a smooth floor, and a stage of two lights, one of them 2 mm in front of the back wall.
 fn room_on_stage() -> World {
-    let smooth = MaterialModel::Principled {
-        base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
-        roughness: ScalarInput::Constant(0.1),
-        metallic: ScalarInput::Constant(0.3),
-        specular: 0.5,
-        flavour: PrincipledFlavour::Blender,
-    };
+    let smooth = principled([0.7, 0.5, 0.3], 0.1, 0.3, PrincipledFlavour::Blender);
     let floor = quad(Vec3::new(-0.9, -0.9, -0.998), Vec3::Z * 1.8, Vec3::X * 1.8);
     let world = World::new(Arc::new(lit_room([[1.0; 3]; 4]))).unwrap();
     let scene = Builder::from(world.scene().clone()).surface(floor, material(smooth)).scene();

@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use glam::DVec2;
-use mateval_dataset::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
-use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SurfaceIndex};
+use mateval_dataset::material::PrincipledFlavour;
+use mateval_dataset::reference::{Emission, MaterialIndex, ReferenceScene, SurfaceIndex};
 use mateval_dataset::{Camera, Intrinsics};
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_testkit::scenes::{box_camera, box_quad, box_room};
+use mateval_testkit::scenes::{Builder, box_camera, box_quad, box_room, material, principled};
 use mateval_tracer::aov::hit_through;
-use mateval_tracer::error::{RequestFault, TracerError};
 use mateval_tracer::{AssumedSurfaces, LightBasis, PhotoCache, RenderSettings, SplitLight, World, render, split_light};
 
 const COLOR: f32 = 0.6;
@@ -21,31 +20,12 @@ const SURFACES: usize = 8;
 fn room() -> ReferenceScene {
     let lamp = |x| box_quad([x, 2.3, 1.0], [0.6, 0.0, 0.0], [0.0, 0.0, 0.6]);
     let mut scene = box_room(vec![lamp(0.5), lamp(3.0)]);
-    scene.materials[0] = Material {
-        name: String::new(),
-        model: MaterialModel::Principled {
-            base_color: ColorInput::Constant([COLOR; 3]),
-            roughness: ScalarInput::Constant(ROUGHNESS),
-            metallic: ScalarInput::Constant(0.0),
-            specular: 0.5,
-            flavour: PrincipledFlavour::Blender,
-        },
-        two_sided: true,
-        opacity: None,
-        bump: None,
+    scene.materials[0] = material(principled([COLOR; 3], ROUGHNESS, 0.0, PrincipledFlavour::Blender));
+    let light = |surface: usize, radiance: f32| {
+        let surfaces = vec![SurfaceIndex(surface)];
+        Emission::Area { surfaces, radiance: [radiance; 3], map: None, two_sided: true }
     };
-    let light = |surface: usize, radiance: f32| LightGroup {
-        name: surface.to_string(),
-        emission: Emission::Area {
-            surfaces: vec![SurfaceIndex(surface)],
-            radiance: [radiance; 3],
-            map: None,
-            two_sided: true,
-        },
-        camera_visible: true,
-    };
-    scene.lights = vec![light(6, 4.0), light(7, 9.0)];
-    scene
+    Builder::from(scene).light(light(6, 4.0)).light(light(7, 9.0)).scene()
 }
 
 fn view() -> Camera {
@@ -68,15 +48,23 @@ fn walls(world: &World) -> Mask {
     })
 }
 
-fn split(world: &World, photo: &Picture<LinearRgb>, cached: &Mask, samples: u32) -> SplitLight {
+/// The light of all pixels, if later surfaces have this color and the photo is the cache where `cached`.
+fn split_as(
+    world: &World,
+    photo: &Picture<LinearRgb>,
+    cached: &Mask,
+    color: f32,
+    metals: &[bool; SURFACES],
+    samples: u32,
+) -> SplitLight {
     let camera = view();
     let cache = PhotoCache::new(world, &camera, photo, cached).unwrap();
-    let assumed = AssumedSurfaces {
-        colors: &[[COLOR; 3]; SURFACES],
-        roughnesses: &[ROUGHNESS; SURFACES],
-        metals: &[false; SURFACES],
-    };
+    let assumed = AssumedSurfaces { colors: &[[color; 3]; SURFACES], roughnesses: &[ROUGHNESS; SURFACES], metals };
     split_light(world, &cache, &photo.map(|_| true), assumed, &settings(samples), &|_, _| ()).unwrap()
+}
+
+fn split(world: &World, photo: &Picture<LinearRgb>, cached: &Mask, samples: u32) -> SplitLight {
+    split_as(world, photo, cached, COLOR, &[false; SURFACES], samples)
 }
 
 /// Base colour times the diffuse part plus gloss, over the photo: its mean, and the root mean square deviation of blocks of
@@ -111,14 +99,7 @@ fn the_parts_make_the_photo_again() {
     let [mean, deviation] = ratio(&split(&world, &photo, &walls(&world), 256), &photo);
     assert!((mean - 1.0).abs() < 0.03 && deviation < 0.05, "cached: {mean} {deviation}");
 
-    let camera = view();
-    let cache = PhotoCache::new(&world, &camera, &photo, &nothing).unwrap();
-    let assumed = AssumedSurfaces {
-        colors: &[[0.5 * COLOR; 3]; SURFACES],
-        roughnesses: &[ROUGHNESS; SURFACES],
-        metals: &[false; SURFACES],
-    };
-    let darker = split_light(&world, &cache, &photo.map(|_| true), assumed, &settings(64), &|_, _| ()).unwrap();
+    let darker = split_as(&world, &photo, &nothing, 0.5 * COLOR, &[false; SURFACES], 64);
     assert!(ratio(&darker, &photo)[0] < 0.9, "the twin passes");
 }
 
@@ -128,10 +109,7 @@ fn a_metal_is_gloss_alone() {
     /// The floor.
     const METAL: usize = 0;
     let mut scene = room();
-    let mut metal = scene.materials[0].clone();
-    let MaterialModel::Principled { metallic, .. } = &mut metal.model else { unreachable!("set above") };
-    *metallic = ScalarInput::Constant(1.0);
-    scene.materials.push(metal);
+    scene.materials.push(material(principled([COLOR; 3], ROUGHNESS, 1.0, PrincipledFlavour::Blender)));
     scene.surfaces[METAL].material = MaterialIndex(1);
     let world = World::new(Arc::new(scene)).unwrap();
     let (photo, camera) = (photo(&world), view());
@@ -145,10 +123,8 @@ fn a_metal_is_gloss_alone() {
     let count = shown.pixels().iter().filter(|shown| **shown).count();
     assert!(count > 20, "the view hardly shows the metal: {count} pixels");
     let nothing = photo.map(|_| false);
-    let cache = PhotoCache::new(&world, &camera, &photo, &nothing).unwrap();
     let split = |metals: &[bool; SURFACES]| {
-        let assumed = AssumedSurfaces { colors: &[[COLOR; 3]; SURFACES], roughnesses: &[ROUGHNESS; SURFACES], metals };
-        let split = split_light(&world, &cache, &photo.map(|_| true), assumed, &settings(256), &|_, _| ()).unwrap();
+        let split = split_as(&world, &photo, &nothing, COLOR, metals, 256);
         let sum = |basis: &LightBasis| -> f64 {
             let whole = basis.weighted(&[[1.0; 3]; 3]).unwrap();
             whole.pixels().iter().zip(shown.pixels()).filter(|(_, shown)| **shown).map(|(v, _)| v.luminance()).sum()
@@ -198,8 +174,8 @@ fn what_does_not_fit_the_world_is_refused() {
     let world = World::new(Arc::new(room())).unwrap();
     let camera = view();
     let small = Picture::filled(8, 8, LinearRgb::default());
-    let found = PhotoCache::new(&world, &camera, &small, &small.map(|_| true)).unwrap_err();
-    assert!(matches!(found, TracerError::InvalidRequest(RequestFault::PictureSize { .. })), "{found}");
+    let found = PhotoCache::new(&world, &camera, &small, &small.map(|_| true)).unwrap_err().to_string();
+    assert!(found.contains("a picture of 8x8, expected 32x18"), "{found}");
     let photo = Picture::filled(32, 18, LinearRgb::default());
     let all = photo.map(|_| true);
     let cache = PhotoCache::new(&world, &camera, &photo, &all).unwrap();
@@ -208,9 +184,6 @@ fn what_does_not_fit_the_world_is_refused() {
         roughnesses: &[ROUGHNESS; SURFACES - 1],
         metals: &[false; SURFACES],
     };
-    let found = split_light(&world, &cache, &all, assumed, &settings(1), &|_, _| ()).unwrap_err();
-    assert!(
-        matches!(found, TracerError::InvalidRequest(RequestFault::OtherWorld { found: 7, expected: 8 })),
-        "{found}"
-    );
+    let found = split_light(&world, &cache, &all, assumed, &settings(1), &|_, _| ()).unwrap_err().to_string();
+    assert!(found.contains("for 7 surfaces in a world of 8"), "{found}");
 }

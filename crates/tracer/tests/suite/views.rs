@@ -4,11 +4,10 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3};
-use mateval_dataset::material::{ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, ScalarInput};
 use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_dataset::{Camera, Intrinsics};
 use mateval_image::{LinearRgb, Picture};
-use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::scenes::{Builder, camera, grey, material, metal, quad, room, sphere};
 use mateval_testkit::statistics::Renders;
 use mateval_tracer::shared_centre::{groups_with_one_centre, noise_blocks};
 use mateval_tracer::{LightBasis, RenderSettings, ViewsRender, World, render_views};
@@ -20,16 +19,10 @@ use super::estimators::worst;
 pub fn lit_room(weights: [[f32; 3]; 4]) -> ReferenceScene {
     let mut walls = room();
     walls.truncate(5);
-    let facets = Some(Microfacets { distribution: Distribution::Ggx, alpha: ScalarInput::Constant(0.3) });
-    let metal = MaterialModel::Conductor {
-        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
-        specular_reflectance: ColorInput::Constant([1.0; 3]),
-        microfacets: facets,
-    };
     let builder = walls.into_iter().fold(Builder::default(), |builder, wall| builder.surface(wall, grey(0.6)));
     let lamp = |k: usize, radiance: [f32; 3]| [0, 1, 2].map(|c| weights[k][c] * radiance[c]);
     builder
-        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal))
+        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal(Some(0.3))))
         .surface(quad(Vec3::new(-0.8, 0.9, -0.8), Vec3::X * 0.4, Vec3::Z * 0.4), grey(0.3))
         .glowing(lamp(0, [6.0, 5.0, 4.0]))
         .surface(quad(Vec3::new(0.4, 0.9, -0.2), Vec3::X * 0.5, Vec3::Z * 0.5), grey(0.3))
@@ -180,7 +173,7 @@ fn splatted_views_are_renders() {
 }
 
 /// The variance of one estimate for every pixel and channel, from independent estimates.
-fn variances(renders: &Renders) -> Vec<f64> {
+pub fn variances(renders: &Renders) -> Vec<f64> {
     let n = renders.pictures().len() as f64;
     let of = |place: usize, channel: usize| {
         let values = renders.pictures().iter().map(|p| f64::from(p.pixels()[place].0[channel]));
