@@ -4,10 +4,11 @@
 //! Evaluation includes the cosine. The choice of a lobe never depends on a colour, so the same paths serve any base
 //! colours.
 
-mod albedo_tables;
+mod blender_tables;
 mod facets;
 mod lobe;
 mod principled;
+mod rough_coat;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -19,10 +20,9 @@ use mateval_image::Texture;
 
 use crate::ray::SurfaceHit;
 use crate::sampling::Frame;
-pub(crate) use albedo_tables::BlenderTables;
-use albedo_tables::Table;
+pub(crate) use blender_tables::BlenderTables;
 pub(crate) use facets::eta_from_specular;
-use lobe::Lobe;
+use lobe::{Lobe, Table};
 pub(crate) use principled::{BsdfPart, Principled};
 use principled::{PrincipledVariants, SecondPrincipled};
 pub(crate) use tables::MaterialTables;

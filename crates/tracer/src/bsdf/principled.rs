@@ -19,7 +19,7 @@ use std::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use mateval_dataset::material::{Distribution, PrincipledFlavour};
 
-use super::albedo_tables::{BlenderTables, FacetAlbedo};
+use super::blender_tables::{BlenderTables, FacetAlbedo};
 use super::facets::{Facets, LocalSample, fresnel_from_thinner, reflect, schlick_weight};
 use crate::sampling;
 
