@@ -1,6 +1,6 @@
 //! The light of a photo split at the first surface: its parts make the picture again.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use glam::DVec2;
 use mateval_dataset::material::PrincipledFlavour;
@@ -39,6 +39,13 @@ fn settings(samples: u32) -> RenderSettings {
 fn photo(world: &World) -> Picture<LinearRgb> {
     render(world, &view(), &settings(1024), &|_, _| ()).unwrap().picture
 }
+
+/// The room and its photo, which is rendered once for all tests.
+static ROOM: LazyLock<(World, Picture<LinearRgb>)> = LazyLock::new(|| {
+    let world = World::new(Arc::new(room())).unwrap();
+    let photo = photo(&world);
+    (world, photo)
+});
 
 /// The pixels that show no lamp.
 fn walls(world: &World) -> Mask {
@@ -91,16 +98,15 @@ fn ratio(split: &SplitLight, photo: &Picture<LinearRgb>) -> [f64; 2] {
 /// photo. A twin with the colours of later surfaces halved does not.
 #[test]
 fn the_parts_make_the_photo_again() {
-    let world = World::new(Arc::new(room())).unwrap();
-    let photo = photo(&world);
+    let (world, photo) = &*ROOM;
     let nothing = photo.map(|_| false);
-    let [mean, deviation] = ratio(&split(&world, &photo, &nothing, 256), &photo);
+    let [mean, deviation] = ratio(&split(world, photo, &nothing, 256), photo);
     assert!((mean - 1.0).abs() < 0.01 && deviation < 0.04, "traced: {mean} {deviation}");
-    let [mean, deviation] = ratio(&split(&world, &photo, &walls(&world), 256), &photo);
+    let [mean, deviation] = ratio(&split(world, photo, &walls(world), 256), photo);
     assert!((mean - 1.0).abs() < 0.03 && deviation < 0.05, "cached: {mean} {deviation}");
 
-    let darker = split_as(&world, &photo, &nothing, 0.5 * COLOR, &[false; SURFACES], 64);
-    assert!(ratio(&darker, &photo)[0] < 0.9, "the twin passes");
+    let darker = split_as(world, photo, &nothing, 0.5 * COLOR, &[false; SURFACES], 64);
+    assert!(ratio(&darker, photo)[0] < 0.9, "the twin passes");
 }
 
 /// The light of a metal is gloss alone; it makes the photo again. A twin that takes the metal for plastic does not.
@@ -144,13 +150,12 @@ fn a_metal_is_gloss_alone() {
 /// Light that the photo holds is booked apart: lamps have less of it, and the photo's own picture is not black.
 #[test]
 fn light_of_the_photo_is_a_picture_of_its_own() {
-    let world = World::new(Arc::new(room())).unwrap();
-    let photo = photo(&world);
+    let (world, photo) = &*ROOM;
     let sum = |split: &SplitLight, picture: usize| -> f64 {
         split.diffuse.pictures()[picture].pixels().iter().map(|pixel| pixel.luminance()).sum()
     };
-    let traced = split(&world, &photo, &photo.map(|_| false), 16);
-    let cached = split(&world, &photo, &walls(&world), 16);
+    let traced = split(world, photo, &photo.map(|_| false), 16);
+    let cached = split(world, photo, &walls(world), 16);
     assert_eq!(traced.diffuse.pictures().len(), 3);
     assert!(sum(&traced, 2) == 0.0 && sum(&cached, 2) > 0.0);
     for lamp in 0..2 {
@@ -160,11 +165,10 @@ fn light_of_the_photo_is_a_picture_of_its_own() {
 
 #[test]
 fn threads_do_not_change_the_bytes() {
-    let world = World::new(Arc::new(room())).unwrap();
-    let photo = photo(&world);
+    let (world, photo) = &*ROOM;
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| split(&world, &photo, &photo.map(|_| true), 4))
+        pool.install(|| split(world, photo, &photo.map(|_| true), 4))
     };
     assert_eq!(on(1), on(3));
 }
