@@ -18,7 +18,7 @@ use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
 use mateval_prep::compare::file::{CompareFile, Quantity, State};
 use mateval_prep::render::RendererKind;
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
-use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
+use mateval_tracer::{RenderSettings, World, render_views};
 
 use super::command::{mateval, run};
 use super::planted::{rehash, roll};
@@ -99,9 +99,8 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
     let pictures = ViewScene::new(&reference, &world, &instances, &scored);
     let parts = parts(dataset, &pictures);
     let settings = RenderSettings { samples, ..Default::default() };
-    let groups = LightGroups::apart(reference.lights.len());
     let centres: Vec<_> = cameras.iter().map(|view| view.camera).collect();
-    let light = render_views(&world, &centres, &groups, &settings, &[71, 72], &|_, _| ()).unwrap();
+    let light = render_views(&world, &centres, &settings, &[71, 72], &|_, _| ()).unwrap();
     for (view, light) in cameras.iter().zip(&light.views) {
         let folder = their_folder(dataset, view.id.as_str());
         std::fs::create_dir_all(&folder).unwrap();
@@ -113,7 +112,7 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
                 exr_io::write_linear(&folder.join(format!("{name}{suffix}.exr")), picture, Precision::Float).unwrap();
             }
         };
-        let [a, b] = [&light.halves[0].basis, &light.halves[1].basis];
+        let [a, b] = [&light.halves[0], &light.halves[1]];
         write("rgb", &a.sum(), &b.sum());
         for (at, (a, b)) in a.pictures().iter().zip(b.pictures()).enumerate() {
             write(&format!("group_{at:02}"), a, b);

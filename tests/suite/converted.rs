@@ -11,7 +11,7 @@ use mateval_dataset::{SceneId, glb, reference};
 use mateval_eval::truth::true_material;
 use mateval_image::{LinearRgb, Picture};
 use mateval_prep::conversion::is_scored_model;
-use mateval_tracer::{Coat, LightGroups, Lighting, RenderSettings, Repaint, World, render_repainted, render_views};
+use mateval_tracer::{Coat, Lighting, RenderSettings, Repaint, Scattering, World, render_repainted, render_views};
 use serde_json::Value;
 
 use super::blender::blender;
@@ -56,21 +56,20 @@ fn the_maps_describe_a_surface_completely() {
     let coat = |instance: &mateval_dataset::dataset::Instance| {
         let size = instance.atlas.as_ref()?.size as usize;
         let truth = true_material(&folder, &instance.id, size).unwrap();
-        Some(Coat { base_colors: vec![truth.base_color], roughness: truth.roughness, metallic: truth.metallic })
+        let scattering = Scattering { roughness: truth.roughness, metallic: truth.metallic };
+        Some(Coat { base_colors: vec![truth.base_color], scattering })
     };
     let coats = scene.instances.iter().map(coat).collect();
     let repaint = Repaint::new(&world, &atlases, coats, PrincipledFlavour::Blender).unwrap();
-    let groups = LightGroups::together(world.scene().lights.len());
     let settings = RenderSettings { samples: 16, ..Default::default() };
     let (cameras, seeds) = ([scene.views[0].camera], [5]);
-    let lighting = Lighting::Apart(&groups);
     let none = |_: usize, _: usize| ();
-    let painted = render_repainted(&world, &repaint, 0..1, &cameras, lighting, &settings, &seeds, &none).unwrap();
+    let painted = render_repainted(&world, &repaint, &cameras, Lighting::Apart, &settings, &seeds, &none).unwrap();
     let rendered = |world: &World| {
-        let render = render_views(world, &cameras, &groups, &settings, &seeds, &none).unwrap();
-        render.views[0].halves[0].basis.sum()
+        let render = render_views(world, &cameras, &settings, &seeds, &none).unwrap();
+        render.views[0].halves[0].sum()
     };
-    let (painted, true_picture) = (painted[0].views[0].halves[0].basis.sum(), rendered(&world));
+    let (painted, true_picture) = (painted[0].views[0].halves[0].sum(), rendered(&world));
     let found = off(&painted, &true_picture);
 
     let source = reference::read_source_materials(&folder, materials.len()).unwrap().unwrap();

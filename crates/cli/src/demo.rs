@@ -35,6 +35,7 @@ use mateval_report::tables::{Grouping, TableFormat, headline, tables, wrapped};
 use serde::{Deserialize, Serialize};
 
 use crate::TOOL;
+use crate::arguments::check_outside_datasets;
 use crate::fetch::{cache_folder, load_weights};
 use crate::prep::make::{BlenderArgs, checked_renderer, renderer_parser, samples_parser};
 use crate::terminal::{Outcome, counted, error_text, print, say, with_progress};
@@ -520,6 +521,7 @@ impl SampleArgs {
         if self.out.exists() && !self.force {
             bail!("'{}' already exists; choose another folder, or add --force to write into it", self.out.display());
         }
+        check_outside_datasets(&self.out, "OUT")?;
         match self.houses {
             None => mateval_sample::write(&self.out),
             Some(count) => mateval_sample::write_houses(&self.out, count, self.seed),

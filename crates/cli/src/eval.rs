@@ -11,7 +11,6 @@ use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
-use mateval_files::work_folder::is_inside;
 use mateval_metrics::{Lpips, Net};
 use mateval_report::pair::{PairValues, compare};
 use mateval_submission::SubmissionError;
@@ -20,7 +19,7 @@ use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
 use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs};
 use crate::TOOL;
-use crate::arguments::{Format, check_output_file, open_submission};
+use crate::arguments::{Format, check_output_file, check_outside_datasets, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
 use crate::terminal::{Outcome, print, say_findings, with_progress};
 
@@ -149,18 +148,13 @@ impl ScoreArgs {
         for (place, path) in
             [("--out", Some(&self.out)), ("--cache", self.cache.as_ref()), ("--pictures", self.pictures.as_ref())]
         {
-            if let Some(path) = path.filter(|path| is_inside(path, &self.dataset)) {
-                bail!(
-                    "'{}' would lie in the dataset, whose manifest does not list it; choose another {place}",
-                    path.display()
-                );
-            }
+            path.iter().try_for_each(|path| check_outside_datasets(path, place))?;
         }
         check_results(&outs, self)?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         let cache = self.cache.clone().unwrap_or_else(|| cache_beside(&self.out));
-        if self.cache.is_some() && !self.only_cached {
+        if !self.only_cached {
             // A folder that cannot be made is found before anything is scored.
             std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
         }

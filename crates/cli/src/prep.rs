@@ -4,12 +4,11 @@
 pub mod make;
 mod publish;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use mateval_dataset::{SceneId, Severity, json};
 use mateval_files::whole::write_whole;
-use mateval_files::work_folder::is_inside;
 use mateval_prep::compare::{CompareOptions, compare, tables};
 use mateval_prep::stats;
 use mateval_prep::verify::verify;
@@ -17,7 +16,7 @@ use mateval_prep::verify::verify;
 use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, samples_parser};
 use self::publish::{ExportArgs, PublishArgs};
 use crate::TOOL;
-use crate::arguments::{Format, check_output_file, open_dataset};
+use crate::arguments::{Format, check_output_file, check_outside_datasets, open_dataset};
 use crate::terminal::{Outcome, print, say, with_progress};
 
 /// Subcommands of `prep`.
@@ -162,7 +161,8 @@ impl StatsArgs {
     /// Counts, draws the chart where one is asked for, and prints the counts.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         if let Some(picture) = &self.picture {
-            check_picture(picture, &self.dataset, self.force)?;
+            check_outside_datasets(picture, "--picture")?;
+            check_output_file(picture, "--picture", "picture", self.force)?;
         }
         let dataset = open_dataset(&self.dataset)?;
         let counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
@@ -178,13 +178,4 @@ impl StatsArgs {
         }
         Ok(Outcome::Good)
     }
-}
-
-/// The dataset's manifest would not list a chart in its folder, so there must be none.
-fn check_picture(picture: &Path, dataset: &Path, force: bool) -> anyhow::Result<()> {
-    if is_inside(picture, dataset) {
-        let shown = picture.display();
-        bail!("'{shown}' would lie in the dataset, whose manifest does not list it; choose another --picture");
-    }
-    check_output_file(picture, "--picture", "picture", force)
 }

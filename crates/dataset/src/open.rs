@@ -132,6 +132,15 @@ fn check_none_absent(root: &Path, file: &DatasetFile, absent: Vec<SceneId>) -> R
     Err(SceneError::AbsentScenes { dataset: root.to_owned(), absent, total: file.scenes.len() })
 }
 
+/// The dataset that `path`, which need not exist, would lie in.
+pub fn enclosing_dataset(path: &Path) -> Option<PathBuf> {
+    let path = std::path::absolute(path).ok()?;
+    // Of the folders above, some may be yet to be made, and others may be links.
+    let above = path.ancestors().skip(1).find_map(|folder| folder.canonicalize().ok())?;
+    let is_dataset = |folder: &&Path| folder.join(DATASET).is_file() && folder.join(MANIFEST).is_file();
+    above.ancestors().find(is_dataset).map(Path::to_owned)
+}
+
 /// Reads `dataset.json` of the dataset in `root`. Fails with what is there instead of a dataset.
 pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, SceneError> {
     let path = root.join(DATASET);

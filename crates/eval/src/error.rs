@@ -29,6 +29,12 @@ pub enum EvalError {
         path: PathBuf,
         what: String,
     },
+    /// A sound reference was rendered with another number of samples.
+    #[error(
+        "the reference of scene '{scene}' was rendered with {found} samples each half, not {wanted}; give --scorer-samples \
+         {found} to keep it, or --force to replace it, which changes the dataset's identity"
+    )]
+    ReferenceSamples { scene: SceneId, found: u32, wanted: u32 },
     /// A result states a number that does not follow from the others in it.
     #[error("'{}': at {place} it states {said}, but its own numbers give {found}; it was changed by hand", path.display())]
     Contradiction { path: PathBuf, place: String, said: String, found: String },

@@ -22,6 +22,13 @@ pub enum PrepError {
         /// The rest of the message: what is wrong, and what to do.
         why: &'static str,
     },
+    /// Pictures exist that were rendered with another number of samples.
+    #[error(
+        "'{}' has {views} views that were rendered with {found} samples each half, not {wanted}; give --samples {found} to \
+         keep them, or --force to replace them, which changes the dataset's identity",
+        path.display()
+    )]
+    OtherSamples { path: PathBuf, views: usize, found: u32, wanted: u32 },
     /// The recipe is not valid, or its sources are missing; all faults are listed.
     #[error("recipe '{}': {}", path.display(), joined(faults))]
     Recipe { path: PathBuf, faults: Vec<RecipeFault> },

@@ -82,10 +82,7 @@ impl MapInput {
     /// Copies the array. Fails for anything but an array of the dtypes of [`Numbers`], and for one of more numbers than
     /// a picture may have: views such as those of `numpy.broadcast_to` may be larger than memory.
     pub fn new(name: &'static str, given: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let Ok(array) = given.cast::<PyUntypedArray>() else {
-            let found = given.get_type().fully_qualified_name()?;
-            return Err(PyTypeError::new_err(format!("{name}: expected a NumPy array, found {found}")));
-        };
+        let array = untyped(name, given)?;
         let count = array.shape().iter().try_fold(1_u64, |count, axis| count.checked_mul(*axis as u64));
         if count.is_none_or(|count| count > 4 * MAX_PIXELS) {
             let found = array.shape();
@@ -143,7 +140,11 @@ impl MapInput {
 
     /// Fails where a float is out of range.
     pub fn check_range(&self, range: &RangeInclusive<f32>) -> PyResult<()> {
-        self.check(&format!("values from {} to {}", range.start(), range.end()), |value| range.contains(&value))
+        let (Numbers::Halves(floats) | Numbers::Floats(floats)) = &self.numbers else { return Ok(()) };
+        let Some(at) = floats.iter().position(|value| !range.contains(value)) else { return Ok(()) };
+        let expected = format!("values from {} to {}", range.start(), range.end());
+        let (found, index) = (floats[at], index_of(at, &self.shape));
+        Err(PyValueError::new_err(format!("{}: expected {expected}, found {found} at {index:?}", self.name)))
     }
 
     /// The side of a square map with a third axis of three channels, or without one. Fails for other shapes and sides.
@@ -190,13 +191,6 @@ impl MapInput {
         }
     }
 
-    fn check(&self, expected: &str, is_good: impl Fn(f32) -> bool) -> PyResult<()> {
-        let (Numbers::Halves(floats) | Numbers::Floats(floats)) = &self.numbers else { return Ok(()) };
-        let Some(at) = floats.iter().position(|value| !is_good(*value)) else { return Ok(()) };
-        let index = index_of(at, &self.shape);
-        Err(PyValueError::new_err(format!("{}: expected {expected}, found {} at {index:?}", self.name, floats[at])))
-    }
-
     fn wrong_shape(&self, expected: &str) -> PyErr {
         PyValueError::new_err(format!("{}: expected the shape {expected}, found {:?}", self.name, self.shape))
     }
@@ -211,19 +205,23 @@ pub enum ColoursOrNumbers {
 
 /// A mask. Fails for anything but an array of bool of the shape (height, width).
 pub fn mask_of(given: &Bound<'_, PyAny>) -> PyResult<Mask> {
-    let Ok(array) = given.cast::<PyUntypedArray>() else {
-        let found = given.get_type().fully_qualified_name()?;
-        return Err(PyTypeError::new_err(format!("mask: expected a NumPy array, found {found}")));
-    };
+    let array = untyped("mask", given)?;
     let Some(pixels) = copied::<bool>(array)? else {
         return Err(PyTypeError::new_err(format!("mask: expected bool, found {}", array.dtype())));
     };
-    let picture = match *array.shape() {
+    let wrong = || format!("mask: expected the shape (height, width), found {:?}", array.shape());
+    match *array.shape() {
         [height, width] => Mask::new(width, height, pixels).ok(),
         _ => None,
-    };
-    let wrong = || format!("mask: expected the shape (height, width), found {:?}", array.shape());
-    picture.ok_or_else(|| PyValueError::new_err(wrong()))
+    }
+    .ok_or_else(|| PyValueError::new_err(wrong()))
+}
+
+fn untyped<'a, 'py>(name: &str, given: &'a Bound<'py, PyAny>) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
+    given.cast::<PyUntypedArray>().or_else(|_| {
+        let found = given.get_type().fully_qualified_name()?;
+        Err(PyTypeError::new_err(format!("{name}: expected a NumPy array, found {found}")))
+    })
 }
 
 /// The elements of an array in row-major order, whatever its strides. `None` where it has another dtype.
@@ -235,15 +233,9 @@ fn copied<T: Element + Copy>(array: &Bound<'_, PyUntypedArray>) -> PyResult<Opti
 
 /// The index of the element `at` in row-major order.
 fn index_of(mut at: usize, shape: &[usize]) -> Vec<usize> {
-    let mut index: Vec<usize> = shape
-        .iter()
-        .rev()
-        .map(|length| {
-            let digit = at % length;
-            at /= length;
-            digit
-        })
-        .collect();
-    index.reverse();
+    let mut index = shape.to_vec();
+    for length in index.iter_mut().rev() {
+        (*length, at) = (at % *length, at / *length);
+    }
     index
 }

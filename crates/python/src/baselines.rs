@@ -211,11 +211,8 @@ fn procedural_maps(
     progress: Progress<'_>,
 ) -> Result<BTreeMap<usize, MadeMaps>, BaselineError> {
     let geometry = SceneGeometry::read(source.folder(), source.file())?;
-    let mut all = BTreeMap::new();
-    for (instance, baked) in scene_maps(&geometry, estimate, options, progress)? {
-        all.insert(instance, MadeMaps { maps: baked.maps, seen: baked.seen });
-    }
-    Ok(all)
+    let all = scene_maps(&geometry, estimate, options, progress)?.into_iter();
+    Ok(all.map(|(instance, baked)| (instance, MadeMaps { maps: baked.maps, seen: baked.seen })).collect())
 }
 
 /// A photo without its light. Its pictures are those of the input view.

@@ -160,7 +160,7 @@ impl Scene {
     /// The source's own parts of the instances, by id, in the order of their index.
     #[getter]
     fn parts(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let all = || by_id(py, self, "part", self.source.file().parts.iter().map(|p| (p.id.as_str(), Part(p.clone()))));
+        let all = || by_id(py, self, "part", self.source.file().parts.iter().map(|p| (p.id.as_str(), Part::new(p))));
         Ok(self.parts.get_or_try_init(py, all)?.clone_ref(py))
     }
 
@@ -169,7 +169,9 @@ impl Scene {
     fn views(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let all = || {
             let views = self.source.file().views.iter().enumerate();
-            by_id(py, self, "view", views.map(|(at, view)| (view.id.as_str(), View::new(&self.source, at))))
+            let source = &self.source;
+            let view = |at| View { source: Arc::clone(source), at };
+            by_id(py, self, "view", views.map(|(at, file)| (file.id.as_str(), view(at))))
         };
         Ok(self.views.get_or_try_init(py, all)?.clone_ref(py))
     }

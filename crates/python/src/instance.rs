@@ -18,75 +18,59 @@ use crate::long_work::failed;
 pub struct Instance {
     source: Arc<SceneSource>,
     at: usize,
+    /// Its id: its folder in a submission.
+    #[pyo3(get)]
+    id: String,
+    /// Its value in `View.instance`, from 1.
+    #[pyo3(get)]
+    index: u16,
+    /// Its name in the source.
+    #[pyo3(get)]
+    name: String,
+    /// Its role in the scene: `architecture`, `furniture`, `light_fixture` or `other`.
+    #[pyo3(get)]
+    role: &'static str,
+    /// Its category; None where the source does not state it.
+    #[pyo3(get)]
+    category: Option<String>,
+    /// Its broader category; None where the source does not state it.
+    #[pyo3(get)]
+    super_category: Option<String>,
+    /// The number of its triangles.
+    #[pyo3(get)]
+    triangles: usize,
+    /// Texels along a side of the baked truth; a submission's maps may have another size. None for glass and for shapes
+    /// without area, which need no maps.
+    #[pyo3(get)]
+    atlas_size: Option<u32>,
 }
 
 impl Instance {
     /// The instance at this place of the scene, which must exist.
     pub fn new(source: &Arc<SceneSource>, at: usize) -> Self {
-        Self { source: Arc::clone(source), at }
-    }
-
-    fn file(&self) -> &dataset::Instance {
-        &self.source.file().instances[self.at]
+        let file = &source.file().instances[at];
+        Self {
+            source: Arc::clone(source),
+            at,
+            id: file.id.to_string(),
+            index: file.index.0.get(),
+            name: file.name.clone(),
+            role: match file.role {
+                Role::Architecture { .. } => "architecture",
+                Role::Furniture {} => "furniture",
+                Role::LightFixture {} => "light_fixture",
+                Role::Other {} => "other",
+            },
+            category: file.category.clone(),
+            super_category: file.super_category.clone(),
+            triangles: file.triangles,
+            atlas_size: file.atlas.as_ref().map(|atlas| atlas.size),
+        }
     }
 }
 
 #[pymethods]
 impl Instance {
-    /// Its id: its folder in a submission.
-    #[getter]
-    fn id(&self) -> &str {
-        self.file().id.as_str()
-    }
-
-    /// Its value in `View.instance`, from 1.
-    #[getter]
-    fn index(&self) -> u16 {
-        self.file().index.0.get()
-    }
-
-    /// Its name in the source.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.file().name
-    }
-
-    /// Its role in the scene: `architecture`, `furniture`, `light_fixture` or `other`.
-    #[getter]
-    fn role(&self) -> &'static str {
-        match self.file().role {
-            Role::Architecture { .. } => "architecture",
-            Role::Furniture {} => "furniture",
-            Role::LightFixture {} => "light_fixture",
-            Role::Other {} => "other",
-        }
-    }
-
-    /// Its category; None where the source does not state it.
-    #[getter]
-    fn category(&self) -> Option<&str> {
-        self.file().category.as_deref()
-    }
-
-    /// Its broader category; None where the source does not state it.
-    #[getter]
-    fn super_category(&self) -> Option<&str> {
-        self.file().super_category.as_deref()
-    }
-
-    /// The number of its triangles.
-    #[getter]
-    fn triangles(&self) -> usize {
-        self.file().triangles
-    }
-
-    /// Texels along a side of the baked truth; a submission's maps may have another size. None for glass and for shapes
-    /// without area, which need no maps.
-    #[getter]
-    fn atlas_size(&self) -> Option<u32> {
-        self.file().atlas.as_ref().map(|atlas| atlas.size)
-    }
-
     /// Its mesh. The first mesh of a scene that is read reads all others too.
     #[getter]
     fn mesh(&self, py: Python<'_>) -> PyResult<Mesh> {
@@ -94,42 +78,34 @@ impl Instance {
     }
 
     fn __repr__(&self) -> String {
-        format!("<mateval.Instance '{}', {} triangles>", self.file().id, self.file().triangles)
+        format!("<mateval.Instance '{}', {} triangles>", self.id, self.triangles)
     }
 }
 
 /// A piece of an instance.
-#[pyclass(frozen, module = "mateval")]
-pub struct Part(pub dataset::Part);
+#[pyclass(frozen, get_all, module = "mateval")]
+pub struct Part {
+    /// Its id.
+    id: String,
+    /// Its value in `View.part`, from 1.
+    index: u16,
+    /// The id of its instance.
+    instance: String,
+    /// The number of its triangles.
+    triangles: usize,
+}
+
+impl Part {
+    pub fn new(file: &dataset::Part) -> Self {
+        let (id, instance) = (file.id.to_string(), file.instance.to_string());
+        Self { id, index: file.index.0.get(), instance, triangles: file.triangles }
+    }
+}
 
 #[pymethods]
 impl Part {
-    /// Its id.
-    #[getter]
-    fn id(&self) -> &str {
-        self.0.id.as_str()
-    }
-
-    /// Its value in `View.part`, from 1.
-    #[getter]
-    fn index(&self) -> u16 {
-        self.0.index.0.get()
-    }
-
-    /// The id of its instance.
-    #[getter]
-    fn instance(&self) -> &str {
-        self.0.instance.as_str()
-    }
-
-    /// The number of its triangles.
-    #[getter]
-    fn triangles(&self) -> usize {
-        self.0.triangles
-    }
-
     fn __repr__(&self) -> String {
-        format!("<mateval.Part '{}', {} triangles>", self.0.id, self.0.triangles)
+        format!("<mateval.Part '{}', {} triangles>", self.id, self.triangles)
     }
 }
 

@@ -213,9 +213,8 @@ impl MapFile {
         input.check_range(if is_color { &BASE_COLOR_RANGE } else { &SCALAR_RANGE })?;
         let [png, exr] = ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending));
         if let Some(earlier) = [&png, &exr].into_iter().find(|path| path.exists()) {
-            let message =
-                format!("{}: expected a map that was not written yet, found '{}'", map.stem(), earlier.display());
-            return Err(PyValueError::new_err(message));
+            let found = format!("expected a map that was not written yet, found '{}'", earlier.display());
+            return Err(PyValueError::new_err(format!("{}: {found}", map.stem())));
         }
         let is_stored = matches!(input.numbers, Numbers::Bytes(_) | Numbers::Words(_));
         Ok(Self { path: if is_stored { png } else { exr }, map, side, input })

@@ -22,16 +22,12 @@ use crate::long_work::{failed, withheld};
 /// A view of a scene. Its pictures are read from their files at each access.
 #[pyclass(frozen, module = "mateval")]
 pub struct View {
-    source: Arc<SceneSource>,
-    at: usize,
+    pub source: Arc<SceneSource>,
+    /// Its place in the scene, which must exist.
+    pub at: usize,
 }
 
 impl View {
-    /// The view at this place of the scene, which must exist.
-    pub fn new(source: &Arc<SceneSource>, at: usize) -> Self {
-        Self { source: Arc::clone(source), at }
-    }
-
     fn file(&self) -> &dataset::View {
         &self.source.file().views[self.at]
     }
@@ -46,9 +42,8 @@ impl View {
         if id.as_str() == INPUT {
             return Ok(());
         }
-        let message =
-            format!("view '{id}' has no {picture}: methods see that of the view '{INPUT}' only; use truth.rgb");
-        Err(PyValueError::new_err(message))
+        let only = format!("methods see that of the view '{INPUT}' only; use truth.rgb");
+        Err(PyValueError::new_err(format!("view '{id}' has no {picture}: {only}")))
     }
 
     fn mask(&self, py: Python<'_>, name: &str) -> PyResult<Mask> {
@@ -156,11 +151,10 @@ impl View {
     fn truth(&self) -> PyResult<Truth> {
         let folder = self.source.folder().truth_view(&self.file().id);
         if folder.is_dir() {
-            return Ok(Truth::new(&self.source, self.at));
+            return Ok(Truth { source: Arc::clone(&self.source), at: self.at });
         }
         let shown = folder.display();
-        let message = format!("'{shown}' does not exist: the ground truth of this dataset is withheld");
-        Err(withheld(message))
+        Err(withheld(format!("'{shown}' does not exist: the ground truth of this dataset is withheld")))
     }
 
     fn __repr__(&self) -> String {
@@ -178,11 +172,6 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// That of the view at this place of the scene, which must exist.
-    pub fn new(source: &Arc<SceneSource>, at: usize) -> Self {
-        Self { source: Arc::clone(source), at }
-    }
-
     fn view(&self) -> &dataset::View {
         &self.source.file().views[self.at]
     }

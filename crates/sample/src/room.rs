@@ -131,102 +131,60 @@ fn objects() -> Vec<Item> {
 }
 
 /// The materials as Mitsuba XML; every opaque one is two-sided.
-const MATERIALS: &str = r#"
-    <bsdf type="twosided" id="planks">
-        <bsdf type="roughplastic">
-            <string name="distribution" value="ggx"/>
-            <float name="alpha" value="0.15"/>
-            <float name="int_ior" value="1.5"/>
-            <float name="ext_ior" value="1"/>
-            <boolean name="nonlinear" value="true"/>
-            <texture name="diffuse_reflectance" type="bitmap">
-                <string name="filename" value="textures/planks.png"/>
-            </texture>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="table_wood">
-        <bsdf type="roughplastic">
-            <string name="distribution" value="ggx"/>
-            <float name="alpha" value="0.08"/>
-            <float name="int_ior" value="1.5"/>
-            <float name="ext_ior" value="1"/>
-            <boolean name="nonlinear" value="true"/>
-            <texture name="diffuse_reflectance" type="bitmap">
-                <string name="filename" value="textures/wood.png"/>
-            </texture>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="wallpaper">
-        <bsdf type="diffuse">
-            <texture name="reflectance" type="bitmap">
-                <string name="filename" value="textures/wallpaper.png"/>
-            </texture>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="fabric">
-        <bsdf type="diffuse">
-            <texture name="reflectance" type="bitmap">
-                <string name="filename" value="textures/fabric.png"/>
-            </texture>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="wool">
-        <bsdf type="diffuse">
-            <texture name="reflectance" type="bitmap">
-                <string name="filename" value="textures/rug.png"/>
-                <string name="wrap_mode" value="clamp"/>
-            </texture>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="white_paint">
-        <bsdf type="diffuse">
-            <rgb name="reflectance" value="0.82, 0.81, 0.78"/>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="wall_paint">
-        <bsdf type="diffuse">
-            <rgb name="reflectance" value="0.72, 0.69, 0.6"/>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="shade">
-        <bsdf type="diffuse">
-            <rgb name="reflectance" value="0.7, 0.66, 0.58"/>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="brass">
-        <bsdf type="roughconductor">
-            <string name="distribution" value="ggx"/>
-            <float name="alpha" value="0.15"/>
-            <rgb name="eta" value="0.444, 0.527, 1.094"/>
-            <rgb name="k" value="3.695, 2.765, 1.829"/>
-        </bsdf>
-    </bsdf>
-    <bsdf type="twosided" id="silver">
-        <bsdf type="conductor">
-            <string name="material" value="none"/>
-        </bsdf>
-    </bsdf>
-    <bsdf type="thindielectric" id="clear_glass">
-        <float name="int_ior" value="1.5"/>
-        <float name="ext_ior" value="1"/>
-    </bsdf>
-"#;
-
-/// Glossy paints: id and linear Rec. 709 colour.
-const GLOSSY: [(&str, &str); 4] = [
-    ("red", "0.55, 0.05, 0.04"),
-    ("teal", "0.03, 0.28, 0.3"),
-    ("yellow", "0.75, 0.5, 0.06"),
-    ("ceramic", "0.78, 0.78, 0.74"),
-];
+fn materials() -> String {
+    let float = |name: &str, value: f64| format!("<float name=\"{name}\" value=\"{value}\"/>");
+    let rgb = |name: &str, value: &str| format!("<rgb name=\"{name}\" value=\"{value}\"/>");
+    let string = |name: &str, value: &str| format!("<string name=\"{name}\" value=\"{value}\"/>");
+    let ggx = |alpha: f64| [string("distribution", "ggx"), float("alpha", alpha)];
+    let plastic = |alpha: f64| [&ggx(alpha)[..], &[float("int_ior", 1.5), float("ext_ior", 1.0)]].concat();
+    let bitmap = |name: &str, file: &str, wrap: &[String]| {
+        let file = string("filename", &format!("textures/{file}.png"));
+        let lines = [&[file], wrap].concat().join("\n                ");
+        format!("<texture name=\"{name}\" type=\"bitmap\">\n                {lines}\n            </texture>")
+    };
+    let two_sided = |id: &str, kind: &str, lines: &[String]| {
+        let lines = lines.join("\n            ");
+        let inner = format!("        <bsdf type=\"{kind}\">\n            {lines}\n        </bsdf>\n");
+        format!("    <bsdf type=\"twosided\" id=\"{id}\">\n{inner}    </bsdf>\n")
+    };
+    let mut xml = String::from("\n");
+    for (id, alpha, file) in [("planks", 0.15, "planks"), ("table_wood", 0.08, "wood")] {
+        let nonlinear = "<boolean name=\"nonlinear\" value=\"true\"/>".to_owned();
+        let base = [nonlinear, bitmap("diffuse_reflectance", file, &[])];
+        xml += &two_sided(id, "roughplastic", &[&plastic(alpha)[..], &base].concat());
+    }
+    for (id, file, wrap) in [
+        ("wallpaper", "wallpaper", &[][..]),
+        ("fabric", "fabric", &[]),
+        ("wool", "rug", &[string("wrap_mode", "clamp")]),
+    ] {
+        xml += &two_sided(id, "diffuse", &[bitmap("reflectance", file, wrap)]);
+    }
+    for (id, color) in
+        [("white_paint", "0.82, 0.81, 0.78"), ("wall_paint", "0.72, 0.69, 0.6"), ("shade", "0.7, 0.66, 0.58")]
+    {
+        xml += &two_sided(id, "diffuse", &[rgb("reflectance", color)]);
+    }
+    let brass = [rgb("eta", "0.444, 0.527, 1.094"), rgb("k", "3.695, 2.765, 1.829")];
+    xml += &two_sided("brass", "roughconductor", &[ggx(0.15), brass].concat());
+    xml += &two_sided("silver", "conductor", &[string("material", "none")]);
+    let glass = [float("int_ior", 1.5), float("ext_ior", 1.0)].join("\n        ");
+    xml += &format!("    <bsdf type=\"thindielectric\" id=\"clear_glass\">\n        {glass}\n    </bsdf>\n");
+    for (id, color) in [
+        ("red", "0.55, 0.05, 0.04"),
+        ("teal", "0.03, 0.28, 0.3"),
+        ("yellow", "0.75, 0.5, 0.06"),
+        ("ceramic", "0.78, 0.78, 0.74"),
+    ] {
+        xml += &two_sided(id, "roughplastic", &[&plastic(0.05)[..], &[rgb("diffuse_reflectance", color)]].concat());
+    }
+    xml
+}
 
 /// The scene as XML of Mitsuba 3.
 pub(super) fn xml() -> String {
     let mut xml = String::from(HEAD);
-    xml.push_str(MATERIALS);
-    for (id, rgb) in GLOSSY {
-        xml.push_str(&GLOSSY_BSDF.replace("ID", id).replace("RGB", rgb));
-    }
+    xml.push_str(&materials());
     for item in items() {
         push_item(&mut xml, &item);
     }
@@ -259,17 +217,6 @@ fn push_item(xml: &mut String, item: &Item) {
     }
     xml.push_str("    </shape>\n");
 }
-
-const GLOSSY_BSDF: &str = r#"    <bsdf type="twosided" id="ID">
-        <bsdf type="roughplastic">
-            <string name="distribution" value="ggx"/>
-            <float name="alpha" value="0.05"/>
-            <float name="int_ior" value="1.5"/>
-            <float name="ext_ior" value="1"/>
-            <rgb name="diffuse_reflectance" value="RGB"/>
-        </bsdf>
-    </bsdf>
-"#;
 
 const HEAD: &str = r#"<?xml version="1.0" encoding="utf-8"?>
 <!-- A room made by MatEval, CC0 1.0. Metres, +y up. -->

@@ -1,7 +1,7 @@
 //! Code that the tests and benches of several crates share. It is only a dev-dependency: no released crate uses it.
 //!
 //! [`scenes`] builds small scenes, [`bench_scene`] reads larger ones, and [`statistics`] compares their noisy renders;
-//! [`sample_dataset`] is the built-in sample as a dataset, with submissions for it, and [`faulty_house`] its house with
+//! `sample_dataset` is the built-in sample as a dataset, with submissions for it, and [`faulty_house`] its house with
 //! a third room and faults; [`packed`] writes archives byte by byte. This file finds inputs that are not in the
 //! repository and makes folders that tests share.
 //!
@@ -13,6 +13,7 @@
 pub mod bench_scene;
 pub mod faulty_house;
 pub mod packed;
+#[cfg(feature = "sample_dataset")]
 pub mod sample_dataset;
 pub mod scenes;
 pub mod statistics;

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_dataset::material::{ColorInput, Material, MaterialModel, TextureIndex, UvTransform};
+use mateval_dataset::material::{
+    ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
+    TextureIndex, UvTransform,
+};
 use mateval_dataset::reference::{
     Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
@@ -56,6 +59,27 @@ pub fn material(model: MaterialModel) -> Material {
 /// A grey Lambertian material.
 pub fn grey(reflectance: f32) -> Material {
     material(MaterialModel::Diffuse { reflectance: ColorInput::Constant([reflectance; 3]), alpha: None })
+}
+
+/// Constant parameters of the principled model.
+pub fn principled(color: [f32; 3], roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
+    MaterialModel::Principled {
+        base_color: ColorInput::Constant(color),
+        roughness: ScalarInput::Constant(roughness),
+        metallic: ScalarInput::Constant(metallic),
+        specular: 0.5,
+        flavour,
+    }
+}
+
+/// A copper-like metal, smooth or with GGX facets of this width.
+pub fn metal(alpha: Option<f32>) -> MaterialModel {
+    let facets = |alpha| Microfacets { distribution: Distribution::Ggx, alpha: ScalarInput::Constant(alpha) };
+    MaterialModel::Conductor {
+        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
+        specular_reflectance: ColorInput::Constant([1.0; 3]),
+        microfacets: alpha.map(facets),
+    }
 }
 
 /// Builds a scene step by step.
@@ -136,13 +160,7 @@ pub fn camera(position: [f64; 3], target: [f64; 3], size: u32, fov_deg: f64) -> 
 pub const WALLS: [usize; 4] = [2, 3, 4, 5];
 
 pub fn box_quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
-    let (corner, u, v) = (Vec3::from(corner), Vec3::from(u), Vec3::from(v));
-    TriangleMesh {
-        positions: vec![corner, corner + u, corner + u + v, corner + v],
-        uvs: Some(vec![Vec2::ZERO; 4]),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Default::default()
-    }
+    TriangleMesh { uvs: Some(vec![Vec2::ZERO; 4]), ..quad(corner.into(), u.into(), v.into()) }
 }
 
 /// Floor, ceiling, walls at x = 0 and 4 and at z = 0 and 6, then `more`; all of one grey.
@@ -157,12 +175,10 @@ pub fn box_room(more: Vec<TriangleMesh>) -> ReferenceScene {
         box_quad([0.0, 0.0, 6.0], x, y),
     ];
     meshes.extend(more);
-    let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-    let material = Material::new("", model);
     let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
     ReferenceScene {
         surfaces: meshes.into_iter().map(surface).collect(),
-        materials: vec![material],
+        materials: vec![grey(0.5)],
         ..Default::default()
     }
 }

@@ -41,6 +41,25 @@ pub fn chi_square_z(mean: f64, freedom: f64) -> f64 {
     (mean.cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt()
 }
 
+/// The deviation of counts of `total` samples from the cells' `probabilities`, as a standard normal: Pearson's chi-square
+/// over cells with at least 10 expected samples. The other cells are pooled with the samples that fell into none.
+pub fn counts_z(counts: &[f64], probabilities: &[f64], total: u32) -> f64 {
+    let n = f64::from(total);
+    let (mut statistic, mut freedom) = (0.0, 0.0_f64);
+    let mut pooled = [n - counts.iter().sum::<f64>(), n * (1.0 - probabilities.iter().sum::<f64>())];
+    for (found, expected) in counts.iter().zip(probabilities.iter().map(|probability| n * probability)) {
+        if expected >= 10.0 {
+            statistic += (found - expected).powi(2) / expected;
+            freedom += 1.0;
+        } else {
+            pooled = [pooled[0] + found, pooled[1] + expected];
+        }
+    }
+    statistic += (pooled[0] - pooled[1]).powi(2) / pooled[1].max(10.0);
+    let freedom = freedom.max(1.0);
+    chi_square_z(statistic / freedom, freedom)
+}
+
 impl Renders {
     /// `count` renders with different seeds.
     pub fn new(world: &World, camera: &Camera, settings: RenderSettings, count: u64) -> Self {

@@ -15,7 +15,7 @@ use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use glam::{DVec2, Vec3};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_testkit::bench_scene;
-use mateval_tracer::{Accel, Ray, TriangleTest};
+use mateval_tracer::{Accel, Ray};
 
 use support::{Contestant, camera, interleaved, median, room, speedup};
 
@@ -39,29 +39,28 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
     let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     println!("\n{name}, {triangles} triangles");
     builds(&meshes);
-    // Build both hierarchies in both modes.
-    let robust = Accel::build(&meshes).unwrap();
-    let fast = Accel::build(&meshes).unwrap().with_test(TriangleTest::Fast);
+    // Build both hierarchies, theirs in both modes.
+    let ours = Accel::build(&meshes).unwrap();
     let embree = Embree::new(&meshes, Mode::Medium, 1, &mut |build| build());
     let embree_robust = Embree::new(&meshes, Mode::Robust, 1, &mut |build| build());
-    println!("{:.1} bytes a triangle", robust.memory_bytes() as f64 / triangles as f64);
+    println!("{:.1} bytes a triangle", ours.memory_bytes() as f64 / triangles as f64);
 
     // Make the sets of rays.
     let coherent = coherent(camera);
-    let bounce = bounced(&robust, &coherent);
-    let second = bounced(&robust, &bounce);
-    let random = uniform(&robust, SIDE * SIDE);
-    let shadow = towards_ceiling(&robust, &coherent, Vec3::Z);
-    let shadow_2 = towards_ceiling(&robust, &bounce, Vec3::Z);
+    let bounce = bounced(&ours, &coherent);
+    let second = bounced(&ours, &bounce);
+    let random = uniform(&ours, SIDE * SIDE);
+    let shadow = towards_ceiling(&ours, &coherent, Vec3::Z);
+    let shadow_2 = towards_ceiling(&ours, &bounce, Vec3::Z);
     let short = shortened(&random, 1.5);
     println!(
-        "{:22} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
-        "times Embree's medium", "Embree's", "its robust", "fast", "watertight", "fast*", "watert.*", "differ"
+        "{:22} {:>10} {:>9} {:>9} {:>9} {:>9}",
+        "times Embree's medium", "Embree's", "its robust", "ours", "ours*", "differ"
     );
     // Compare nearest hits.
     for (kind, set) in [("coherent", &coherent), ("bounce 1", &bounce), ("bounce 2", &second), ("random", &random)] {
         let differing =
-            set.iter().filter(|ray| differs(robust.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
+            set.iter().filter(|ray| differs(ours.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
         row(
             kind,
             set.len(),
@@ -70,20 +69,16 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
             [
                 Box::new(|| sum(set, |ray| embree.closest(ray).map(|hit| hit.2))),
                 Box::new(|| sum(set, |ray| embree_robust.closest(ray).map(|hit| hit.2))),
-                Box::new(|| sum(set, |ray| fast.closest(ray).map(|hit| hit.distance))),
-                Box::new(|| sum(set, |ray| robust.closest(ray).map(|hit| hit.distance))),
+                Box::new(|| sum(set, |ray| ours.closest(ray).map(|hit| hit.distance))),
                 Box::new(|| {
-                    sum_many(set, |rays, values| fast.closest_many(rays, values), |hit| hit.map(|h| h.distance))
-                }),
-                Box::new(|| {
-                    sum_many(set, |rays, values| robust.closest_many(rays, values), |hit| hit.map(|h| h.distance))
+                    sum_many(set, |rays, values| ours.closest_many(rays, values), |hit| hit.map(|h| h.distance))
                 }),
             ],
         );
     }
     // Compare occlusion.
     for (kind, set) in [("shadow 1", &shadow), ("shadow 2", &shadow_2), ("occlusion to 1.5 m", &short)] {
-        let differing = set.iter().filter(|ray| robust.occluded(ray) != embree.occluded(ray)).count();
+        let differing = set.iter().filter(|ray| ours.occluded(ray) != embree.occluded(ray)).count();
         row(
             kind,
             set.len(),
@@ -92,10 +87,8 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
             [
                 Box::new(|| sum(set, |ray| embree.occluded(ray).then_some(1.0))),
                 Box::new(|| sum(set, |ray| embree_robust.occluded(ray).then_some(1.0))),
-                Box::new(|| sum(set, |ray| fast.occluded(ray).then_some(1.0))),
-                Box::new(|| sum(set, |ray| robust.occluded(ray).then_some(1.0))),
-                Box::new(|| sum_many(set, |rays, values| fast.occluded_many(rays, values), |hit| hit.then_some(1.0))),
-                Box::new(|| sum_many(set, |rays, values| robust.occluded_many(rays, values), |hit| hit.then_some(1.0))),
+                Box::new(|| sum(set, |ray| ours.occluded(ray).then_some(1.0))),
+                Box::new(|| sum_many(set, |rays, values| ours.occluded_many(rays, values), |hit| hit.then_some(1.0))),
             ],
         );
     }
@@ -146,20 +139,18 @@ fn sum_many<V: Copy>(rays: &[Ray], trace: impl Fn(&[Ray], &mut Vec<V>), value: i
     std::hint::black_box(sum);
 }
 
-fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box<dyn FnMut() + 'a>; 6]) {
-    let names = ["medium", "robust", "fast", "watertight", "fast, many", "watertight, many"];
+fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box<dyn FnMut() + 'a>; 4]) {
+    let names = ["medium", "robust", "ours", "ours, many"];
     let mut contestants: Vec<Contestant> = names.into_iter().zip(runs).collect();
     let seconds = interleaved(rounds, &mut contestants);
     let rate = |seconds: &[f64]| count as f64 / median(seconds) / 1e6;
     let ratio = |which: usize| speedup(&seconds[0], &seconds[which]);
     println!(
-        "{kind:22} {:6.2} M/s {:9.2} {:9.2} {:9.2} {:9.2} {:9.2} {differing:9}",
+        "{kind:22} {:6.2} M/s {:9.2} {:9.2} {:9.2} {differing:9}",
         rate(&seconds[0]),
         ratio(1),
         ratio(2),
-        ratio(3),
-        ratio(4),
-        ratio(5)
+        ratio(3)
     );
 }
 

@@ -1,9 +1,8 @@
 //! Peak memory by triangles, emitters and resolution: `cargo bench -p mateval-tracer --bench memory`.
 //!
 //! Each case is a separate process, which creates a room, renders a light basis with one sample per pixel and reports
-//! its peak resident memory (Linux only). The memory of the pictures is known beforehand and limited. A case fails if
-//! it takes more than the sum of that limit, the unfinished tiles, and the memory of the same triangles with almost no
-//! pictures.
+//! its peak resident memory (Linux only). The memory of the pictures is known beforehand. A case fails if it takes more
+//! than the sum of them, the unfinished tiles, and the memory of the same triangles with almost no pictures.
 #![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
@@ -14,7 +13,7 @@ use glam::{DVec3, Vec2, Vec3};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
 use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
 use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
-use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
+use mateval_tracer::{RenderSettings, World, render_views};
 
 /// The render of one process.
 #[derive(Clone, Copy)]
@@ -22,19 +21,10 @@ struct Case {
     triangles: u32,
     lights: u32,
     size: [u32; 2],
-    /// The limit on the light basis, in bytes.
-    bytes: u64,
-}
-
-/// The measurements of one process.
-struct Taken {
-    peak: u64,
-    groups: u64,
 }
 
 const TINY: [u32; 2] = [64, 36];
 const USUAL: [u32; 2] = [480, 270];
-const BOUND: u64 = mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 const OFFSETS: [[f64; 2]; 5] = [[0.0, 0.0], [5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
 const HALVES: u64 = 2;
 const MIB: f64 = 1024.0 * 1024.0;
@@ -49,71 +39,63 @@ fn main() {
 }
 
 fn parent() {
-    println!("| triangles | lights | pixels | bound MiB | groups | pictures MiB | peak MiB | bytes a triangle |");
-    println!("|---|---|---|---|---|---|---|---|");
-    let case = |triangles, lights, size, bytes| Case { triangles, lights, size, bytes };
-    let empty = run(case(2, 1, TINY, BOUND)).peak;
+    println!("| triangles | lights | pixels | pictures MiB | peak MiB | bytes a triangle |");
+    println!("|---|---|---|---|---|---|");
+    let case = |triangles, lights, size| Case { triangles, lights, size };
+    let empty = run(case(2, 1, TINY));
     for triangles in [20_000, 1_000_000, 3_000_000] {
-        let case = case(triangles, 1, TINY, BOUND);
-        let taken = run(case);
-        let each = (taken.peak - empty) as f64 / f64::from(triangles);
-        row(case, &taken, &format!("{each:.0}"));
+        let case = case(triangles, 1, TINY);
+        let peak = run(case);
+        let each = (peak - empty) as f64 / f64::from(triangles);
+        row(case, peak, &format!("{each:.0}"));
         assert!(triangles < 1_000_000 || each < 600.0, "{each} bytes a triangle");
     }
-    let room = run(case(20_000, 1, TINY, BOUND)).peak;
-    let lights = [1, 16, 64, 138, 256].map(|lights| case(20_000, lights, USUAL, BOUND));
-    let sizes = [[240, 135], [960, 540]].map(|size| case(20_000, 16, size, BOUND));
-    for case in lights.into_iter().chain(sizes).chain([case(20_000, 256, USUAL, 256 << 20)]) {
-        let taken = run(case);
-        row(case, &taken, "");
-        let pictures = pictures(case, taken.groups);
-        assert!(pictures <= case.bytes);
+    let room = run(case(20_000, 1, TINY));
+    let lights = [1, 16, 64, 138].map(|lights| case(20_000, lights, USUAL));
+    let sizes = [[240, 135], [960, 540]].map(|size| case(20_000, 16, size));
+    for case in lights.into_iter().chain(sizes) {
+        let peak = run(case);
+        row(case, peak, "");
+        let pictures = pictures(case);
         let threads = std::thread::available_parallelism().unwrap().get() as u64;
-        // Unfinished tiles, and a tenth of the pictures for path counts and for memory that the allocator retains.
-        let most =
-            room + pictures + pictures / 10 + 64_000 * OFFSETS.len() as u64 * taken.groups * threads + (32 << 20);
-        assert!(taken.peak <= most, "{} bytes taken, {most} expected at most", taken.peak);
+        // Unfinished tiles, and a tenth of the pictures for memory that the allocator retains.
+        let tiles = 64_000 * OFFSETS.len() as u64 * u64::from(case.lights) * threads;
+        let most = room + pictures + pictures / 10 + tiles + (32 << 20);
+        assert!(peak <= most, "{peak} bytes taken, {most} expected at most");
     }
 }
 
-fn pictures(case: Case, groups: u64) -> u64 {
-    12 * HALVES * OFFSETS.len() as u64 * u64::from(case.size[0]) * u64::from(case.size[1]) * groups
+fn pictures(Case { lights, size: [width, height], .. }: Case) -> u64 {
+    12 * HALVES * OFFSETS.len() as u64 * [width, height, lights].map(u64::from).iter().product::<u64>()
 }
 
-fn row(case: Case, taken: &Taken, each: &str) {
-    let Case { triangles, lights, size: [width, height], bytes } = case;
-    let mib = |bytes: u64| bytes as f64 / MIB;
-    let (groups, bound, peak) = (taken.groups, mib(bytes), mib(taken.peak));
-    let pictures = mib(pictures(case, groups));
-    println!(
-        "| {triangles} | {lights} | {width} x {height} | {bound:.0} | {groups} | {pictures:.0} | {peak:.0} | {each} |"
-    );
+fn row(case: Case, peak: u64, each: &str) {
+    let Case { triangles, lights, size: [width, height] } = case;
+    let [pictures, peak] = [pictures(case), peak].map(|bytes| bytes as f64 / MIB);
+    println!("| {triangles} | {lights} | {width} x {height} | {pictures:.0} | {peak:.0} | {each} |");
 }
 
-fn run(case: Case) -> Taken {
-    let Case { triangles, lights, size: [width, height], bytes } = case;
-    let words = [u64::from(triangles), u64::from(lights), u64::from(width), u64::from(height), bytes];
+/// The peak memory of a process of this case, in bytes.
+fn run(Case { triangles, lights, size: [width, height] }: Case) -> u64 {
+    let words = [triangles, lights, width, height];
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.arg("--case").args(words.map(|word| word.to_string()));
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let numbers: Vec<u64> =
-        String::from_utf8(output.stdout).unwrap().split_whitespace().map(|word| word.parse().unwrap()).collect();
-    Taken { peak: numbers[0], groups: numbers[1] }
+    String::from_utf8(output.stdout).unwrap().trim().parse().unwrap()
 }
 
 fn child(words: &[String]) {
-    let numbers: Vec<u64> = words.iter().map(|word| word.parse().unwrap()).collect();
-    let (triangles, lights, size) = (numbers[0] as u32, numbers[1] as u32, [numbers[2] as u32, numbers[3] as u32]);
+    let numbers: Vec<u32> = words.iter().map(|word| word.parse().unwrap()).collect();
+    let (triangles, lights, size) = (numbers[0], numbers[1], [numbers[2], numbers[3]]);
     let world = World::new(Arc::new(room(triangles, lights))).unwrap();
     let intrinsics = Intrinsics::from_fov_x(size[0], size[1], 1.0);
     let input = Camera::look_at(DVec3::new(0.0, 1.6, 3.0), DVec3::new(0.0, 1.0, 0.0), DVec3::Y, intrinsics).unwrap();
     let cameras = OFFSETS.map(|[x, y]| input.turned(x, y));
-    let groups = LightGroups::within(numbers[4], lights as usize, &cameras, HALVES as usize).unwrap();
     let settings = RenderSettings { samples: 1, max_bounces: 2, ..Default::default() };
-    let done = render_views(&world, &cameras, &groups, &settings, &[1, 2], &|_, _| ()).unwrap();
-    assert_eq!(done.passes, 1);
-    println!("{} {}", peak_bytes(), groups.groups().len());
+    let done = render_views(&world, &cameras, &settings, &[1, 2], &|_, _| ()).unwrap();
+    assert_eq!(done.views.len(), OFFSETS.len());
+    println!("{}", peak_bytes());
 }
 
 /// A bumpy floor of `triangles` triangles under `lights` small lamps.

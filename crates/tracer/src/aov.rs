@@ -5,8 +5,7 @@ use mateval_dataset::Camera;
 use mateval_dataset::material::Appearance;
 use mateval_dataset::reference::SurfaceIndex;
 
-use crate::ray::Hit;
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::world::World;
 
 /// Sub-pixels along each side of a pixel.
@@ -166,42 +165,23 @@ fn towards_camera(shading: DVec3, geometric: DVec3, direction: DVec3) -> Vec3 {
 mod tests {
     use std::sync::Arc;
 
-    use mateval_dataset::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
-    use mateval_dataset::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};
-    use mateval_dataset::{Intrinsics, TriangleMesh};
+    use mateval_dataset::Intrinsics;
+    use mateval_dataset::material::{Material, ScalarInput, TextureIndex};
+    use mateval_dataset::reference::{ReferenceScene, SourceTexture};
     use mateval_image::{Texels, Texture, Wrap};
+    use mateval_testkit::scenes::{Builder, grey, quad};
 
     use super::*;
 
-    fn quad(z: f32, material: usize) -> Surface {
-        let corner = |x: f32, y: f32| Vec3::new(x, y, z);
-        let mesh = TriangleMesh {
-            positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
-            normals: None,
-            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        };
-        Surface { name: String::new(), mesh, material: MaterialIndex(material) }
-    }
-
     /// A sheet at z = -2 whose left half is cut out, in front of a wall at z = -4.
     fn world() -> World {
-        let plain = Material {
-            name: String::new(),
-            model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
-            two_sided: true,
-            opacity: None,
-            bump: None,
-        };
+        let [sheet, wall] = [-2.0, -4.0].map(|z| quad(Vec3::new(-1.0, -1.0, z), Vec3::X * 2.0, Vec3::Y * 2.0));
         let opacity = ScalarInput::Texture { texture: TextureIndex(0), channel: 0, uv: Default::default() };
         let texture = Texture::new(2, 1, Texels::Grey(vec![0.0, 1.0]), Wrap::Clamp).unwrap();
-        World::new(Arc::new(ReferenceScene {
-            surfaces: vec![quad(-2.0, 1), quad(-4.0, 0)],
-            materials: vec![plain.clone(), Material { opacity: Some(opacity), ..plain }],
-            textures: vec![SourceTexture { name: String::new(), sha256: None, texture }],
-            lights: Vec::new(),
-        }))
-        .unwrap()
+        let covered = Material { opacity: Some(opacity), ..grey(0.5) };
+        let mut scene = Builder::default().surface(sheet, covered).surface(wall, grey(0.5)).scene();
+        scene.textures.push(SourceTexture { name: String::new(), sha256: None, texture });
+        World::new(Arc::new(scene)).unwrap()
     }
 
     fn camera() -> Camera {

@@ -12,7 +12,7 @@
 //! 1. [`World`] checks the scene, builds the bounding volume hierarchy ([`Accel`]) and prepares lights and materials.
 //! 2. [`Sampler`] derives every random number from seed, pixel and sample index.
 //! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
-//! 4. The material at that place becomes a [`Bsdf`]; [`emitter`] samples a light; the BSDF samples the next ray.
+//! 4. The material at that place becomes a BSDF ([`bsdf`]); [`emitter`] samples a light; the BSDF samples the next ray.
 //! 5. [`render`](mod@render) averages the samples of each tile in a fixed order.
 //! 6. [`noise_filter`] takes the noise out of a picture that people, SSIM or LPIPS see.
 //!
@@ -35,16 +35,15 @@ pub mod shared_centre;
 pub mod split;
 pub mod world;
 
-pub use accel::{Accel, InstructionSet, TriangleTest};
-pub use bsdf::{Bsdf, BsdfSample};
+pub use accel::Accel;
 pub use emitter::StageLight;
 pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
-pub use light_basis::{LightBasis, LightGroups};
+pub use light_basis::LightBasis;
 pub use path::{LightSampling, RenderSettings};
 pub use ray::{Hit, Ray, SurfaceHit, TriangleIndex};
 pub use render::{Render, RenderStats, render};
 pub use repaint::{Coat, Repaint, Scattering, render_repainted};
 pub use sampling::Sampler;
-pub use shared_centre::{HalfLight, LightMix, Lighting, ViewLight, ViewsRender, render_views};
+pub use shared_centre::{LightMix, Lighting, ViewLight, ViewsRender, render_views};
 pub use split::{AssumedSurfaces, PhotoCache, SplitLight, split_light};
 pub use world::World;

@@ -26,7 +26,7 @@ pub const LEAST_COSINE: f32 = 0.9;
 pub const KERNEL: [f32; 4] = [0.5, 0.25, 0.125, 0.0625];
 
 /// The least base colour that light is divided by.
-pub const LEAST_BASE_COLOR: f32 = 0.05;
+const LEAST_BASE_COLOR: f32 = 0.05;
 
 /// What a view shows, without noise. All pictures have one size.
 #[derive(Clone, Copy)]

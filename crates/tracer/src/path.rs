@@ -103,7 +103,7 @@ impl<'w, const K: usize> MaterialSource<'w, K> for OwnMaterials<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
-        self.0.bsdf_of_colors(place, wo)
+        self.0.bsdf(place, wo)
     }
 }
 
@@ -116,6 +116,7 @@ const STRAIGHT: f32 = 0.9999;
 /// Events counted along paths.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathCounts {
+    pub(crate) paths: u64,
     pub(crate) rays: u64,
     pub(crate) shadow_rays: u64,
     pub(crate) capped: u64,
@@ -215,6 +216,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             self.paths.push(Path { which, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
             self.rays.push(ray);
         }
+        self.counts.paths += self.paths.len() as u64;
         let mut scatterings = 0;
         while !self.paths.is_empty() {
             self.arrive(scatterings, &mut add);
@@ -328,7 +330,7 @@ fn sample_light<const K: usize>(
     let [a, b, c, _] = path.sampler.set(1 + 2 * scatterings);
     let light = world.emitters().sample(place.position, [a, b, c], |place| world.opacity_at(place))?;
     let part = if light.on_stage { BsdfPart::Stage } else { BsdfPart::All };
-    let (values, density) = bsdf.evaluate_all(light.direction, part);
+    let (values, density) = bsdf.evaluate(light.direction, part);
     if values == [Vec3::ZERO; K] {
         return None;
     }

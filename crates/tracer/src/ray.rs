@@ -124,7 +124,7 @@ impl SurfaceHit {
 
     /// Whether `direction`, away from the surface, leaves on the front.
     #[inline]
-    pub fn is_front(&self, direction: Vec3) -> bool {
+    pub(crate) fn is_front(&self, direction: Vec3) -> bool {
         self.geometric_normal.dot(direction) > 0.0
     }
 
@@ -136,7 +136,7 @@ impl SurfaceHit {
 
     /// A shadow ray from here to just before `other`, or `None` if both coincide.
     #[inline]
-    pub fn spawn_to(&self, other: &SurfaceHit) -> Option<Ray> {
+    pub(crate) fn spawn_to(&self, other: &SurfaceHit) -> Option<Ray> {
         let towards = other.position - self.position;
         let (from, to) = (self.beside(towards), other.beside(-towards));
         let distance = (to - from).length();
@@ -223,12 +223,7 @@ mod tests {
     /// A tilted square with side `size` near (1, 1, 1) * `size`.
     fn square(size: f32) -> TriangleMesh {
         let (u, v) = (Vec3::new(0.6, 0.0, 0.8) * size, Vec3::new(0.48, 0.8, -0.36) * size);
-        let origin = Vec3::splat(size);
-        TriangleMesh {
-            positions: vec![origin, origin + u, origin + u + v, origin + v],
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-            ..Default::default()
-        }
+        mateval_testkit::scenes::quad(Vec3::splat(size), u, v)
     }
 
     /// At scales from a millimetre to ten kilometres, rays that leave a plane at any angle never hit it again, and the

@@ -42,44 +42,6 @@ pub struct Render {
 ///
 /// The bytes of the picture are the same for any number of threads in the current rayon pool. Fails if a setting is out
 /// of range.
-///
-/// # Examples
-///
-/// A grey wall in uniform light of radiance 1 reflects half of it:
-///
-/// ```
-/// use std::sync::Arc;
-///
-/// use glam::{DVec3, Vec3};
-/// use mateval_dataset::material::{ColorInput, Material, MaterialModel};
-/// use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface};
-/// use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
-/// use mateval_tracer::{RenderSettings, World, render};
-///
-/// let mesh = TriangleMesh {
-///     positions: vec![Vec3::new(-9.0, -9.0, -2.0), Vec3::new(9.0, -9.0, -2.0), Vec3::new(0.0, 9.0, -2.0)],
-///     triangles: vec![[0, 1, 2]],
-///     ..Default::default()
-/// };
-/// let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-/// let grey = Material { name: "grey".into(), model, two_sided: true, opacity: None, bump: None };
-/// let sky = Emission::Constant { radiance: [1.0; 3] };
-/// let world = World::new(Arc::new(ReferenceScene {
-///     surfaces: vec![Surface { name: "wall".into(), mesh, material: MaterialIndex(0) }],
-///     materials: vec![grey],
-///     lights: vec![LightGroup { name: "sky".into(), emission: sky, camera_visible: true }],
-///     ..Default::default()
-/// }))?;
-///
-/// let intrinsics = Intrinsics::from_fov_x(8, 8, 0.5);
-/// let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
-/// let settings = RenderSettings { samples: 16, ..Default::default() };
-/// let picture = render(&world, &camera, &settings, &|_finished, _total| ())?.picture;
-///
-/// let mean = picture.pixels().iter().map(|pixel| pixel.0[0]).sum::<f32>() / 64.0;
-/// assert!((mean - 0.5).abs() < 0.02, "{mean}");
-/// # Ok::<(), mateval_tracer::TracerError>(())
-/// ```
 pub fn render(
     world: &World,
     camera: &Camera,
@@ -88,16 +50,26 @@ pub fn render(
 ) -> Result<Render, TracerError> {
     settings.check()?;
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-    let total = tiles(width, height).len();
-    let finished = AtomicUsize::new(0);
-    let (picture, counts) = develop(
-        width,
-        height,
-        |tile| develop_tile(world, camera, settings, tile),
-        || progress(finished.fetch_add(1, Ordering::Relaxed) + 1, total),
-    );
-    let paths = (width * height) as u64 * u64::from(settings.samples);
-    Ok(Render { picture, stats: stats(paths, &counts, 0) })
+    let tiles = tiles(width, height);
+    let progress = Progress::new(tiles.len(), progress);
+    // Each pixel is rendered by one thread, so that the result does not depend on their number.
+    let developed: Vec<(Vec<[f64; 3]>, PathCounts)> = tiles
+        .par_iter()
+        .map(|tile| {
+            let developed = develop_tile(world, camera, settings, tile);
+            progress.advance();
+            developed
+        })
+        .collect();
+    let mut picture = Picture::filled(width, height, LinearRgb::default());
+    let mut counts = Vec::with_capacity(tiles.len());
+    for (tile, (pixels, of_tile)) in tiles.iter().zip(developed) {
+        for ([x, y], pixel) in tile.pixels().zip(pixels) {
+            picture.set(x, y, LinearRgb(pixel.map(|v| v as f32)));
+        }
+        counts.push(of_tile);
+    }
+    Ok(Render { picture, stats: stats(&counts, 0) })
 }
 
 /// The mean of each pixel's samples. A batch of paths holds one path per pixel.
@@ -127,9 +99,10 @@ pub(crate) fn camera_start(camera: &Camera, seed: u64, [x, y]: [usize; 2], index
 }
 
 /// Sums the counts of all tiles, for one of the variants that share the paths.
-pub(crate) fn stats(paths: u64, tiles: &[PathCounts], variant: usize) -> RenderStats {
+pub(crate) fn stats(tiles: &[PathCounts], variant: usize) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
     let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[variant]).sum();
+    let paths = sum(|tile| tile.paths);
     let all = paths.max(1) as f64;
     RenderStats {
         paths,
@@ -170,39 +143,22 @@ impl Tile {
     }
 }
 
-/// Renders a picture tile by tile. `develop_tile` returns a tile's pixels, row by row, and extra data, which is
-/// returned in the order of the tiles.
-///
-/// Tiles are distributed over the threads of the current pool. Each pixel is rendered by one thread, so the result does
-/// not depend on their number. `done` is called after each tile, in no particular order.
-pub(crate) fn develop<E: Send>(
-    width: usize,
-    height: usize,
-    develop_tile: impl Fn(&Tile) -> (Vec<[f64; 3]>, E) + Sync,
-    done: impl Fn() + Sync,
-) -> (Picture<LinearRgb>, Vec<E>) {
-    let tiles = tiles(width, height);
-    // Render all tiles in parallel.
-    let developed: Vec<(Vec<LinearRgb>, E)> = tiles
-        .par_iter()
-        .map(|tile| {
-            let (pixels, extra) = develop_tile(tile);
-            let pixels = pixels.into_iter().map(|pixel| LinearRgb(pixel.map(|v| v as f32))).collect();
-            done();
-            (pixels, extra)
-        })
-        .collect();
-    // Copy them into the picture, in order.
-    let mut picture = Picture::filled(width, height, LinearRgb::default());
-    let mut extras = Vec::with_capacity(tiles.len());
-    for (tile, (pixels, extra)) in tiles.iter().zip(developed) {
-        for (row, values) in pixels.chunks(tile.width).enumerate() {
-            let start = (tile.y + row) * width + tile.x;
-            picture.pixels_mut()[start..start + tile.width].copy_from_slice(values);
-        }
-        extras.push(extra);
+/// Counts finished tiles and reports them.
+pub(crate) struct Progress<'a> {
+    finished: AtomicUsize,
+    total: usize,
+    report: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+impl<'a> Progress<'a> {
+    /// `report` is called with the number of finished tiles and `total`.
+    pub(crate) fn new(total: usize, report: &'a (dyn Fn(usize, usize) + Sync)) -> Self {
+        Self { finished: AtomicUsize::new(0), total, report }
     }
-    (picture, extras)
+
+    pub(crate) fn advance(&self) {
+        (self.report)(self.finished.fetch_add(1, Ordering::Relaxed) + 1, self.total);
+    }
 }
 
 #[cfg(test)]
@@ -210,19 +166,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_pixel_is_made_once_and_put_in_its_place() {
-        let tile = |tile: &Tile| {
-            let pixels: Vec<[f64; 3]> = tile.pixels().map(|[x, y]| [x as f64, y as f64, 0.0]).collect();
-            let count = pixels.len();
-            (pixels, count)
-        };
-        let (picture, counts) = develop(37, 18, tile, || ());
-        assert_eq!(counts.iter().sum::<usize>(), 37 * 18);
-        assert_eq!(counts.len(), 6);
-        for y in 0..18 {
-            for x in 0..37 {
-                assert_eq!(picture.get(x, y), LinearRgb([x as f32, y as f32, 0.0]));
-            }
-        }
+    fn tiles_hold_every_pixel_once() {
+        let mut pixels: Vec<[usize; 2]> = tiles(37, 18).iter().flat_map(Tile::pixels).collect();
+        pixels.sort_unstable();
+        assert!(pixels.into_iter().eq((0..37).flat_map(|x| (0..18).map(move |y| [x, y]))));
     }
 }

@@ -19,7 +19,8 @@ use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
 use crate::error::{RequestFault, TracerError};
 use crate::path::{MOST_VARIANTS, MaterialSource, RenderSettings};
 use crate::ray::{Hit, SurfaceHit};
-use crate::shared_centre::{Lighting, Progress, Subject, ViewsJob, ViewsRender};
+use crate::render::Progress;
+use crate::shared_centre::{Lighting, ViewsJob, ViewsRender};
 use crate::world::World;
 
 /// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when
@@ -28,10 +29,7 @@ use crate::world::World;
 pub struct Coat {
     /// One per prediction; lookups return linear values.
     pub base_colors: Vec<Texture>,
-    /// Perceptual roughness, in the first channel.
-    pub roughness: Texture,
-    /// Metallic, in the first channel.
-    pub metallic: Texture,
+    pub scattering: Scattering,
 }
 
 /// The maps of one surface that decide in which directions light scatters.
@@ -124,12 +122,12 @@ impl Repaint {
     }
 
     /// The material of `base_color` with these maps at `uv`.
-    fn principled(&self, base_color: Vec3, [roughness, metallic]: [&Texture; 2], uv: Vec2) -> Principled<'_> {
+    fn principled(&self, base_color: Vec3, maps: &Scattering, uv: Vec2) -> Principled<'_> {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
         Principled {
             base_color,
-            roughness: scalar(roughness),
-            metallic: scalar(metallic),
+            roughness: scalar(&maps.roughness),
+            metallic: scalar(&maps.metallic),
             eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
         }
@@ -147,7 +145,8 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
         let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
         if let Some(coat) = &self.repaint.coats[place.surface.0] {
             let colors = coat.base_colors[self.first..].iter().take(K);
-            for texture in colors.chain([&coat.roughness, &coat.metallic]) {
+            let Scattering { roughness, metallic } = &coat.scattering;
+            for texture in colors.chain([roughness, metallic]) {
                 texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
             }
         }
@@ -155,29 +154,26 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
-        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf_of_colors(place, wo) };
+        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf(place, wo) };
         let base_colors = self.repaint.base_colors(coat, self.first, uv);
         let principled = |maps| self.repaint.principled(base_colors[0], maps, uv);
         let second = self.repaint.second.as_ref().and_then(|second| {
-            let Scattering { roughness, metallic } = second.of_surface[place.surface.0].as_ref()?;
-            Some((principled([roughness, metallic]), second.from.saturating_sub(self.first)))
+            let maps = second.of_surface[place.surface.0].as_ref()?;
+            Some((principled(maps), second.from.saturating_sub(self.first)))
         });
-        let first = principled([&coat.roughness, &coat.metallic]);
-        Bsdf::of_principled(first, second, &base_colors, place, wo)
+        Bsdf::of_principled(principled(&coat.scattering), second, &base_colors, place, wo)
     }
 }
 
 /// [`crate::render_views`] with predictions in place of the world's own materials. Returns one render for each
-/// prediction of the range `which`.
+/// prediction.
 ///
 /// Up to eight predictions share their paths. The bytes of each render are the same as if its prediction were rendered
-/// alone. Fails as [`crate::render_views`] does, and if `which` exceeds the predictions of `repaint`, or if mixes do
-/// not match predictions and lights.
-#[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
+/// alone. Fails as [`crate::render_views`] does, if `repaint` was made for another world, or if mixes do not match
+/// predictions and lights.
 pub fn render_repainted(
     world: &World,
     repaint: &Repaint,
-    which: Range<usize>,
     cameras: &[Camera],
     lighting: Lighting<'_>,
     settings: &RenderSettings,
@@ -185,15 +181,18 @@ pub fn render_repainted(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ViewsRender>, TracerError> {
     // Check everything before the first path.
-    check_predictions(world, repaint, &which)?;
+    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
+    if found != expected {
+        return Err(RequestFault::OtherWorld { found, expected }.into());
+    }
     let job = |Range { start: first, end }: Range<usize>| {
-        let subject =
-            Subject { world, materials: Painted { world, repaint, first }, first, variants: end - first, lighting };
-        ViewsJob { subject, cameras, settings, seeds }
+        let (materials, variants) = (Painted { world, repaint, first }, end - first);
+        ViewsJob { world, materials, first, variants, lighting, cameras, settings, seeds }
     };
     let planes = job(0..0).planes(repaint.predictions)?;
     // Render the predictions in rounds that share their paths.
-    let rounds = rounds(which);
+    let starts = (0..repaint.predictions).step_by(MOST_VARIANTS);
+    let rounds: Vec<_> = starts.map(|start| start..repaint.predictions.min(start + MOST_VARIANTS)).collect();
     let progress = Progress::new(job(0..0).tiles(&planes) * rounds.len(), progress);
     let mut renders = Vec::new();
     for round in rounds {
@@ -207,22 +206,6 @@ pub fn render_repainted(
         });
     }
     Ok(renders)
-}
-
-fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
-    let end = which.end;
-    which.step_by(MOST_VARIANTS).map(|start| start..end.min(start + MOST_VARIANTS)).collect()
-}
-
-fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), RequestFault> {
-    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
-    if found != expected {
-        return Err(RequestFault::OtherWorld { found, expected });
-    }
-    if which.end > repaint.predictions {
-        return Err(RequestFault::Predictions { found: which.clone(), count: repaint.predictions });
-    }
-    Ok(())
 }
 
 /// Checks the arguments of [`Repaint::new`] and returns the number of predictions.

@@ -11,7 +11,6 @@
 //! needs no assumption on colours, and comes as one more picture after those of the lights.
 
 use std::array::from_fn;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use glam::{DVec2, Vec2, Vec3};
@@ -27,7 +26,7 @@ use crate::error::{ExceededLimit, RequestFault, TracerError};
 use crate::light_basis::LightBasis;
 use crate::path::{MaterialSource, PathTracer, RenderSettings};
 use crate::ray::{Hit, SurfaceHit};
-use crate::render::{Tile, camera_start, tiles};
+use crate::render::{Progress, Tile, camera_start, tiles};
 use crate::repaint::SPECULAR;
 use crate::world::World;
 
@@ -179,14 +178,15 @@ pub fn split_light(
         return Err(RequestFault::PictureSize { found, expected: [width, height] }.into());
     }
     let pictures = world.emitters().groups() + 1;
-    let group_bytes = (2 * width * height * size_of::<LinearRgb>()) as u64;
-    if group_bytes.saturating_mul(pictures as u64) > MOST_BYTES {
-        return Err(ExceededLimit::BasisBytes { halves: 1, views: 1, group_bytes, allowed: MOST_BYTES }.into());
+    let bytes = (2 * width * height * size_of::<LinearRgb>()) as u64 * pictures as u64;
+    if bytes > MOST_BYTES {
+        let pictures = 2 * pictures;
+        return Err(ExceededLimit::PictureBytes { pictures, width, height, bytes, limit: MOST_BYTES }.into());
     }
     let tables = BlenderTables::new(eta_from_specular(SPECULAR));
     let split = Split { assumed, cache, tables: &tables };
     let tiles = tiles(width, height);
-    let finished = AtomicUsize::new(0);
+    let progress = Progress::new(tiles.len(), progress);
     // Each tile is put into the pictures as it is finished: all of them beside the pictures would take as much again.
     let bases: [LightBasis; 2] = from_fn(|_| LightBasis::black(width, height, pictures));
     let bases = Mutex::new(bases);
@@ -201,7 +201,7 @@ pub fn split_light(
             }
         }
         drop(bases);
-        progress(finished.fetch_add(1, Ordering::Relaxed) + 1, tiles.len());
+        progress.advance();
     });
     let [diffuse, gloss] = bases.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(SplitLight { diffuse, gloss })

@@ -66,8 +66,7 @@ impl World {
         // Rays read large textures and triangle records at random: keep them on huge pages.
         let texels = textures.iter().map(Texture::bytes);
         texels.filter(|bytes| bytes.len() >= SMALL_TEXTURE).for_each(move_to_huge_pages);
-        let [low, high] = accel.bounds();
-        let size = low.abs().max(high.abs()).max_element();
+        let size = accel.size;
         let records: Vec<TriangleRecord> = meshes(&scene)
             .into_par_iter()
             .flat_map_iter(|mesh| {
@@ -106,9 +105,7 @@ impl World {
     /// The same surfaces and materials, lit only by stage lights: the scene's own lamps no longer emit. Light group k
     /// is `stage[k]`. Fails if a light has no triangles, or a number is not finite.
     pub fn on_stage(&self, stage: &[StageLight]) -> Result<Self, TracerError> {
-        let [low, high] = self.accel.bounds();
-        let size = low.abs().max(high.abs()).max_element();
-        let emitters = Emitters::on_stage(stage, self.scene.surfaces.len(), size)?;
+        let emitters = Emitters::on_stage(stage, self.scene.surfaces.len(), self.accel.size)?;
         Ok(Self { emitters, ..self.clone() })
     }
 
@@ -178,7 +175,7 @@ impl World {
     }
 
     /// Whether the nearest surface that is not wholly transparent is not wholly opaque either.
-    pub fn meets_fractional_opacity(&self, ray: &Ray) -> bool {
+    pub(crate) fn meets_fractional_opacity(&self, ray: &Ray) -> bool {
         if !self.masked {
             return false;
         }
@@ -220,7 +217,7 @@ impl World {
     }
 
     /// The opacity at a hit; 1 if the material has none.
-    pub fn opacity(&self, hit: &Hit) -> f32 {
+    pub(crate) fn opacity(&self, hit: &Hit) -> f32 {
         match &self.material_of(hit.surface).opacity {
             None => 1.0,
             Some(opacity) => opacity.at(&self.textures, self.source_uv(hit)),
@@ -228,7 +225,7 @@ impl World {
     }
 
     /// The opacity at a place; 1 if the material has none.
-    pub fn opacity_at(&self, place: &SurfaceHit) -> f32 {
+    pub(crate) fn opacity_at(&self, place: &SurfaceHit) -> f32 {
         self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
     }
 
@@ -241,7 +238,7 @@ impl World {
     }
 
     /// The surface's own uv at a hit; zero if it has none.
-    pub fn source_uv(&self, hit: &Hit) -> Vec2 {
+    fn source_uv(&self, hit: &Hit) -> Vec2 {
         let [a, b, c] = self.records[hit.global as usize].uvs;
         a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
     }
@@ -251,13 +248,8 @@ impl World {
         SurfaceHit::new(hit.surface, hit.triangle, &self.records[hit.global as usize], hit.barycentrics)
     }
 
-    /// The BSDF of the surface's own material at `hit`, seen from `wo`.
-    pub fn bsdf(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_> {
-        self.bsdf_of_colors(hit, wo)
-    }
-
-    /// [`Self::bsdf`] for `K` material variants, all the same.
-    pub(crate) fn bsdf_of_colors<const K: usize>(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_, K> {
+    /// The BSDF of the surface's own material at `hit`, seen from `wo`, the same for all `K` variants.
+    pub(crate) fn bsdf<const K: usize>(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_, K> {
         let surface = &self.scene.surfaces[hit.surface.0];
         let index = surface.material.0;
         let (material, table) = (&self.scene.materials[index], self.tables.of(index));

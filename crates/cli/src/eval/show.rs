@@ -18,7 +18,7 @@ use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_submission::archive::Opened;
 
 use crate::TOOL;
-use crate::arguments::{Format, open_submission};
+use crate::arguments::{Format, check_outside_datasets, open_submission};
 use crate::terminal::{Outcome, print, say, with_progress};
 
 #[derive(clap::Args)]
@@ -226,6 +226,7 @@ pub struct PicturesArgs {
 impl PicturesArgs {
     /// Writes the pictures and prints their paths.
     pub fn run(&self) -> anyhow::Result<Outcome> {
+        check_outside_datasets(&self.out.join("pictures"), "--out")?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         let submissions: Vec<&Path> = opened.iter().map(Opened::root).collect();
@@ -287,6 +288,7 @@ pub struct LeaderboardArgs {
 impl LeaderboardArgs {
     /// Writes the site and prints the path of its first page.
     pub fn run(&self) -> anyhow::Result<Outcome> {
+        check_outside_datasets(&self.out, "--out")?;
         let files = match &self.from {
             Some(folder) => ResultsFolder::list(folder)?,
             None => ResultsFolder {

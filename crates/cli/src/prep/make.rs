@@ -21,6 +21,7 @@ use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, s
 use mateval_sources::front3d::camera_rules::CameraRules;
 
 use crate::TOOL;
+use crate::arguments::check_outside_datasets;
 use crate::fetch::{cache_folder, check_blender};
 use crate::terminal::{Outcome, counted, print, say, say_findings, with_progress};
 
@@ -118,6 +119,7 @@ impl SurveyArgs {
     /// Surveys the houses; the answer is no where no room qualifies, or fewer than the scenes that are wanted.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let options = self.checked()?;
+        check_outside_datasets(&self.out, "--out")?;
         let surveyed =
             with_progress(|progress| survey(&options, TOOL, progress)).context("cannot survey the houses")?;
         if surveyed.kept > 0 {
@@ -204,6 +206,7 @@ pub struct BuildArgs {
 impl BuildArgs {
     /// Builds the dataset and reports the findings of each scene.
     pub fn run(&self) -> anyhow::Result<Outcome> {
+        check_outside_datasets(&self.out, "--out")?;
         let options = BuildOptions {
             recipe: self.recipe.clone(),
             source: self.source.clone(),
@@ -495,6 +498,7 @@ impl PerturbArgs {
     /// Writes the folder, and prints a line for each scene.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         check_free(&self.out, self.force, "--out")?;
+        check_outside_datasets(&self.out, "--out")?;
         let options = PerturbOptions { kind: self.kind.into(), level: self.level, seed: self.seed };
         let scenes = with_progress(|progress| perturb(&self.dataset, &self.out, &options, progress))
             .context("cannot perturb the dataset")?;

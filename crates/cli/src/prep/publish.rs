@@ -14,6 +14,7 @@ use mateval_report::release::file::Day;
 use mateval_report::release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
 
 use crate::TOOL;
+use crate::arguments::check_outside_datasets;
 use crate::prep::make::samples_parser;
 use crate::terminal::{Outcome, counted, print, say, with_progress};
 
@@ -117,7 +118,11 @@ fn halves(args: &PublishArgs) -> anyhow::Result<Option<[&PathBuf; 2]>> {
     if public == private {
         bail!("--public and --private are the same folder; the ground truth would not be withheld");
     }
-    for place in [public, private] {
+    if lies_in(public, private) || lies_in(private, public) {
+        bail!("--public and --private would lie in each other; choose two separate folders");
+    }
+    for (place, flag) in [(public, "--public"), (private, "--private")] {
+        check_outside_datasets(place, flag)?;
         if place.exists() && !args.force {
             bail!("'{}' already exists; choose another folder, or add --force to overwrite it", place.display());
         }
@@ -125,11 +130,16 @@ fn halves(args: &PublishArgs) -> anyhow::Result<Option<[&PathBuf; 2]>> {
     Ok(Some([public, private]))
 }
 
+/// Whether `inner` would lie in `outer`; neither need exist.
+fn lies_in(inner: &Path, outer: &Path) -> bool {
+    let [inner, outer] = [inner, outer].map(|path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()));
+    inner.starts_with(&outer) || is_inside(&inner, &outer)
+}
+
 /// Fails where the report would lie in a folder of the split, which holds nothing but files of the dataset, or the
 /// other way round, where replacing the report would delete it.
 fn check_report(options: &ReleaseOptions, halves: &Option<[&PathBuf; 2]>) -> anyhow::Result<()> {
     let out = options.out.as_path();
-    let lies_in = |inner: &Path, outer: &Path| inner.starts_with(outer) || is_inside(inner, outer);
     for half in halves.iter().flatten() {
         if lies_in(out, half) || lies_in(half, out) {
             bail!("'{}' and '{}' would lie in each other; choose another --report", out.display(), half.display());
@@ -268,6 +278,7 @@ impl ExportArgs {
 
     fn export_view(&self, scene: &SceneId) -> anyhow::Result<Vec<Finding>> {
         check_free(&self.out, self.force, "folder")?;
+        check_outside_datasets(&self.out, "--out")?;
         let dataset = Dataset::open(&self.dataset)?;
         let samples = match self.samples {
             Some(samples) => samples,

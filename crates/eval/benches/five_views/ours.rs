@@ -7,7 +7,7 @@ use mateval_dataset::Camera;
 use mateval_image::{LinearRgb, Picture};
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_fit::{FitTarget, fit_lights};
-use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
+use mateval_tracer::{RenderSettings, ViewLight, World, render_views};
 
 use crate::FIT_SIZE;
 use crate::Run;
@@ -30,10 +30,9 @@ pub fn load(folder: &Path) -> (World, Camera) {
 
 /// Stream C, the fit, and both halves of all views for each number of samples.
 pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], round: u64) -> Run {
-    let groups = LightGroups::apart(world.scene().lights.len());
     let render = |cameras: &[Camera], samples: u32, seeds: &[u64]| {
         let settings = RenderSettings { samples, max_bounces: 6, ..Default::default() };
-        render_views(world, cameras, &groups, &settings, seeds, &|_, _| ()).unwrap().views
+        render_views(world, cameras, &settings, seeds, &|_, _| ()).unwrap().views
     };
     let seed = 100 * round;
     let (stream_c, stage) =
@@ -42,7 +41,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
     let photo = photo(folder);
     let (fit, stage) = Stage::measure("fit", 0, || {
         let target = FitTarget { photo: &photo, mask: None, exposure: 1.0 };
-        fit_lights(&FitRules::default(), &stream_c[0].halves[0].basis, &target).unwrap()
+        fit_lights(&FitRules::default(), &stream_c[0].halves[0], &target).unwrap()
     });
     stages.push(stage);
     let mut errors: Vec<f64> = fit.weights.iter().flatten().map(|weight| (weight - 1.0).abs()).collect();
@@ -60,7 +59,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
             let views = render(cameras, samples / 2, &seeds);
             // The scored pictures; their noise is compared under the scene's own radiances.
             let halves = views.iter().flat_map(|view| &view.halves);
-            let scored: Vec<_> = halves.map(|half| half.basis.weighted(&fit.weights).unwrap()).collect();
+            let scored: Vec<_> = halves.map(|half| half.weighted(&fit.weights).unwrap()).collect();
             std::hint::black_box(scored);
             views
         });
@@ -71,7 +70,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
 }
 
 fn mean_of_halves(view: &ViewLight) -> Vec<f32> {
-    let [a, b] = [0, 1].map(|half| view.halves[half].basis.sum());
+    let [a, b] = [0, 1].map(|half| view.halves[half].sum());
     let channels = |p: Picture<LinearRgb>| p.into_pixels().into_iter().flat_map(|pixel| pixel.0);
     channels(a).zip(channels(b)).map(|(a, b)| (a + b) / 2.0).collect()
 }

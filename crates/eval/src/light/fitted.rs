@@ -10,7 +10,7 @@ use mateval_dataset::{Camera, RendererId, SceneLights};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
 use mateval_light::light_stage;
-use mateval_tracer::{LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
+use mateval_tracer::{LightBasis, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
 use rayon::prelude::*;
 
 use crate::error::EvalError;
@@ -148,12 +148,11 @@ impl LitRoom {
         let input = task.input_view()?;
         let place = task.views.iter().position(|view| view.id == input.id);
         let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: task.scene.id.clone() })?;
-        let groups = LightGroups::apart(self.names.len());
         let samples = (paths.rules.fit.samples / 2).max(1);
         let bases = |stream: &str| -> Result<Vec<LightBasis>, EvalError> {
             let cameras = std::slice::from_ref(&input.camera);
-            let renders = paths.trace(repaint, Lighting::Apart(&groups), cameras, samples, stream)?;
-            Ok(renders.into_iter().map(|mut render| render.views.remove(0).halves.remove(0).basis).collect())
+            let renders = paths.trace(repaint, Lighting::Apart, cameras, samples, stream)?;
+            Ok(renders.into_iter().map(|mut render| render.views.remove(0).halves.remove(0)).collect())
         };
         let (first, second) = (bases("fit_a")?, bases("fit_b")?);
         let target =

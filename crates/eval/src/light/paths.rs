@@ -52,8 +52,7 @@ impl Paths<'_> {
         let seeds = [self.seed(stream)];
         let settings = self.rules.settings(samples);
         let shown = |done: usize, all: usize| (self.progress)(Report::step(&what, done, all));
-        let which = 0..repaint.predictions();
-        Ok(render_repainted(self.world, repaint, which, cameras, lighting, &settings, &seeds, &shown)?)
+        Ok(render_repainted(self.world, repaint, cameras, lighting, &settings, &seeds, &shown)?)
     }
 
     /// The quarters of the first `predictions` that travel, by prediction, light mix and view, and the number of
@@ -101,7 +100,10 @@ impl Paths<'_> {
         let coat = |surface: usize| {
             let PredictedMaterial { roughness, metallic, .. } = first.materials[surface].clone()?;
             let base_colors = all.iter().map(|scene| Some(scene.materials[surface].as_ref()?.base_color.clone()));
-            Some(Coat { base_colors: base_colors.collect::<Option<_>>()?, roughness, metallic })
+            Some(Coat {
+                base_colors: base_colors.collect::<Option<_>>()?,
+                scattering: Scattering { roughness, metallic },
+            })
         };
         let coats: Vec<Option<Coat>> = (0..self.atlases.len()).map(coat).collect();
         let repaint = Repaint::new(self.world, self.atlases, coats, self.rules.flavour)?;
@@ -133,5 +135,5 @@ pub(crate) fn batches(all: &[PredictedScene], predictions: &[usize], others: usi
 
 /// A picture of one view. Every stream has one seed, so the tracer's list of halves holds one.
 pub(crate) fn picture_of(render: &ViewsRender, view: usize, picture: usize) -> &Picture<LinearRgb> {
-    &render.views[view].halves[0].basis.pictures()[picture]
+    &render.views[view].halves[0].pictures()[picture]
 }

@@ -20,7 +20,7 @@ use mateval_files::untrusted::sha256_of_file;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::Precision;
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
-use mateval_tracer::{LightGroups, Lighting};
+use mateval_tracer::Lighting;
 
 use crate::error::EvalError;
 use crate::light::difference::{encoded, mean_of};
@@ -71,8 +71,12 @@ pub fn make_references(
     for (at, scene) in chosen.iter().enumerate() {
         progress(Report::part(&format!("reference of scene {}", scene.id), at, chosen.len()));
         let stored = StoredReference::check(&dataset, scene);
-        let is_same = |stored: &StoredReference| stored.file.samples_each_half == options.samples;
-        if !options.force && stored.is_ok_and(|stored| stored.is_some_and(|stored| is_same(&stored))) {
+        // A reference that is damaged or of another build is made again; one that is sound is not replaced unasked.
+        if let (false, Ok(Some(stored))) = (options.force, &stored) {
+            let (found, wanted) = (stored.file.samples_each_half, options.samples);
+            if found != wanted {
+                return Err(EvalError::ReferenceSamples { scene: scene.id.clone(), found, wanted });
+            }
             report.kept += 1;
             continue;
         }
@@ -101,7 +105,6 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
     // The only protocol that compares with R.
     let rules = &Protocol::named("mateval-3")?.light;
     let truth = true_maps(&folder, scene)?;
-    let groups = LightGroups::apart(file.lights.len());
     // The views of a set share paths.
     for set in [ViewSet::Turned, ViewSet::Wide] {
         let views = set.of(&scene.views.iter().collect::<Vec<_>>());
@@ -112,13 +115,13 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
         let paths = Paths { scene: &scene.id, world: &world, atlases: &atlases, rules, pass, progress };
         let repaint = paths.repaint(&[&truth], None)?;
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-        let half = |stream| paths.trace(&repaint, Lighting::Apart(&groups), &cameras, samples, stream);
+        let half = |stream| paths.trace(&repaint, Lighting::Apart, &cameras, samples, stream);
         let [a, b] = [half("a")?.remove(0), half("b")?.remove(0)];
         if set == ViewSet::Turned {
             file.seeds = ["a", "b"].map(|stream| format!("{:016x}", paths.seed(stream)));
         }
         for ((view, a), b) in views.iter().zip(a.views).zip(b.views) {
-            let [a, b] = [&a.halves[0].basis, &b.halves[0].basis];
+            let [a, b] = [&a.halves[0], &b.halves[0]];
             let valid = png_io::read_mask(&folder.view(&view.id).join("valid.png"))?;
             file.variance.insert(view.id.clone(), variance([&a.sum(), &b.sum()], &valid, scene.exposure));
             let of_view = work.path().join(view.id.as_str());
@@ -281,7 +284,7 @@ mod tests {
         let mix: Vec<[f64; 3]> = (0..groups.len()).map(|at| [1.0, 0.5, 2.0].map(|v| v * (1 + at) as f64)).collect();
         let mixes = [vec![mix.clone()]];
         let fresh = paths.trace(&repaint, Lighting::Mixed(&mixes), &[view.camera], 128, "a").unwrap().remove(0);
-        let fresh = mean(&fresh.views[0].halves[0].basis.pictures()[0]);
+        let fresh = mean(&fresh.views[0].halves[0].pictures()[0]);
         let size = [groups[0].width(), groups[0].height()];
         let found = mean(&weighted(&groups, &mix, 1.0, size));
         let twin = mean(&weighted(&groups, &vec![[1.0; 3]; groups.len()], 1.0, size));

@@ -15,7 +15,7 @@ use mateval_light::light_stage::{self, NamedLight};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
-    Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
+    Coat, LightBasis, LightMix, Lighting, RenderSettings, Repaint, Scattering, StageLight, World, render_repainted,
 };
 
 use super::sample::{dataset, hasty, write_truth};
@@ -60,16 +60,13 @@ fn basis_of(
     let coat = |surface: usize| {
         prediction.materials[surface].as_ref().map(|material| Coat {
             base_colors: vec![material.base_color.clone()],
-            roughness: material.roughness.clone(),
-            metallic: material.metallic.clone(),
+            scattering: Scattering { roughness: material.roughness.clone(), metallic: material.metallic.clone() },
         })
     };
     let repaint = Repaint::new(world, atlases, (0..atlases.len()).map(coat).collect(), flavour()).unwrap();
-    let groups = LightGroups::apart(world.emitters().groups());
     let settings = RenderSettings { samples, ..Default::default() };
-    let (light, quiet) = (Lighting::Apart(&groups), |_: usize, _: usize| ());
-    let done = render_repainted(world, &repaint, 0..1, &[camera], light, &settings, &[seed], &quiet);
-    done.unwrap().remove(0).views.remove(0).halves.remove(0).basis
+    let done = render_repainted(world, &repaint, &[camera], Lighting::Apart, &settings, &[seed], &|_, _| ());
+    done.unwrap().remove(0).views.remove(0).halves.remove(0)
 }
 
 /// The planted radiance: 0.5 to 3.5, different in every channel.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::{Finding, Severity};
 use mateval_sources::source_scene::Missing;
-use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
+use mateval_tracer::{LightBasis, RenderSettings, World, render_views};
 
 use super::fault::{SceneFault, above_notes};
 use super::pictures::Seen;
@@ -139,12 +139,11 @@ pub(super) fn is_lit(plan: &Plan) -> Result<bool, PrepError> {
         return Ok(true);
     }
     let world = World::new(Arc::clone(&plan.scene))?;
-    let groups = LightGroups::apart(world.emitters().groups());
     let camera = coarse(&plan.views[0].camera);
     for samples in LIGHT_SAMPLES {
         let settings = RenderSettings { samples, ..RenderSettings::default() };
-        let render = render_views(&world, &[camera], &groups, &settings, &[0], &|_, _| {})?;
-        let sums = render.views[0].halves.iter().map(|half| half.basis.sum());
+        let render = render_views(&world, &[camera], &settings, &[0], &|_, _| {})?;
+        let sums = render.views[0].halves.iter().map(LightBasis::sum);
         if sums.flat_map(|sum| sum.pixels().to_vec()).any(|pixel| pixel.0.iter().any(|value| *value > 0.0)) {
             return Ok(true);
         }

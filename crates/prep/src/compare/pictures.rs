@@ -11,8 +11,7 @@ use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::{Camera, Progress, Report, SceneId, json};
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
-use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
-use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
+use mateval_tracer::{RenderSettings, ViewLight, World, render_views};
 
 use super::file::{Check, STANDARD_ERRORS, State, file_check};
 use super::light::ShownKinds;
@@ -78,6 +77,10 @@ pub(super) fn seeds(scene: &SceneId) -> [u64; 2] {
     })
 }
 
+/// The most memory that the pictures of all lights may take at once: 138 lights in two halves of five views of 480 x 270
+/// pixels.
+const MOST_BYTES: u64 = 2 << 30;
+
 /// Renders `views` of the scene: all from one set of paths where they share a centre and their pictures fit in memory,
 /// otherwise one after the other.
 pub(super) fn render_ours(
@@ -90,27 +93,28 @@ pub(super) fn render_ours(
     let settings = RenderSettings { samples, max_bounces: MAX_BOUNCES, ..Default::default() };
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let lights = world.scene().lights.len();
-    let merged = |cameras: &[Camera]| {
-        Ok::<_, PrepError>(LightGroups::within(DEFAULT_BASIS_BYTES, lights, cameras, 2)?.is_merged())
+    let fit = |cameras: &[Camera]| {
+        let pixels = |camera: &Camera| u64::from(camera.intrinsics.width) * u64::from(camera.intrinsics.height);
+        let halves = 2 * cameras.iter().map(pixels).sum::<u64>() * size_of::<LinearRgb>() as u64;
+        halves.saturating_mul(lights as u64) <= MOST_BYTES
     };
-    let at_once = if merged(&cameras)? { 1 } else { cameras.len().max(1) };
-    let groups = LightGroups::apart(lights);
+    let at_once = if fit(&cameras) { cameras.len().max(1) } else { 1 };
     let mut found = Vec::new();
     let passes = cameras.len().div_ceil(at_once);
     for (pass, cameras) in cameras.chunks(at_once).enumerate() {
-        if merged(cameras)? {
-            return Err(PrepError::TooManyLights { scene: id.clone(), lights, most_bytes: DEFAULT_BASIS_BYTES });
+        if !fit(cameras) {
+            return Err(PrepError::TooManyLights { scene: id.clone(), lights, most_bytes: MOST_BYTES });
         }
         let step = format!("{id} ours");
         let shown = |done: usize, all: usize| progress(Report::step(&step, pass * all + done, passes * all));
-        let rendered = render_views(world, cameras, &groups, &settings, &seeds(id), &shown)?;
+        let rendered = render_views(world, cameras, &settings, &seeds(id), &shown)?;
         found.extend(rendered.views.iter().map(light_of));
     }
     Ok(found)
 }
 
 fn light_of(view: &ViewLight) -> OurLight {
-    let [a, b] = [0, 1].map(|half| &view.halves[half].basis);
+    let [a, b] = [0, 1].map(|half| &view.halves[half]);
     let groups = a.pictures().iter().zip(b.pictures());
     let groups = groups.map(|(a, b)| Halves { a: a.clone(), b: b.clone() }).collect();
     OurLight { rgb: Halves { a: a.sum(), b: b.sum() }, groups }

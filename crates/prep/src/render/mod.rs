@@ -18,12 +18,12 @@ use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder};
 use mateval_dataset::open::{chosen_ids, read_dataset_file};
-use mateval_dataset::render_file::RenderFile;
 use mateval_dataset::render_file::RenderNoise;
-use mateval_dataset::{Progress, Report, SceneId, json, reference};
+use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
+use mateval_dataset::{Progress, RendererId, Report, SceneId, json, reference};
 use mateval_image::{ImageError, Picture, exr_io, png_io};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
-use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
+use mateval_tracer::{LightBasis, RenderSettings, RenderStats, World, render_views};
 
 use crate::blender::LightPictures;
 pub use crate::blender::{BlenderLimits, BlenderProgram};
@@ -115,6 +115,9 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
         None => recipe::read(&build_recipe.unwrap_or(root.join(RECIPE)))?.0.samples,
     };
     let one_at_a_time = options.renderer.scenes_at_once() == 1;
+    if !options.force {
+        check_samples(root, &wanted, &renderer, samples)?;
+    }
     let run = RenderRun { root, renderer, samples, force: options.force, one_at_a_time };
     let mut report = match wanted.is_empty() {
         true => RenderReport::default(),
@@ -131,6 +134,22 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
         }
     }
     Ok(report)
+}
+
+/// Fails where views were rendered with another number of samples: hours of work are not replaced unasked.
+fn check_samples(root: &Path, scenes: &[&SceneId], renderer: &RendererId, wanted: u32) -> Result<(), PrepError> {
+    let mut others: Vec<u32> = Vec::new();
+    for id in scenes {
+        let folder = SceneFolder::of(root, id);
+        let scene: SceneFile = json::read(&folder.scene_file())?;
+        let rendered = scene.views.iter().map(|view| folder.render(renderer, &view.id).join(RENDER_FILE));
+        let samples = rendered.filter_map(|path| Some(json::read::<RenderFile>(&path).ok()?.samples_each_half));
+        others.extend(samples.filter(|samples| *samples != wanted));
+    }
+    match others.first() {
+        None => Ok(()),
+        Some(&found) => Err(PrepError::OtherSamples { path: root.to_owned(), views: others.len(), found, wanted }),
+    }
 }
 
 /// Those of the scenes that are rendered, then those that have a photo from elsewhere.
@@ -178,10 +197,8 @@ fn render_scene(
         let step = format!("view {}", view.id);
         let shown = |done: usize, all: usize| progress(Report::step(&step, done, all));
         let settings = RenderSettings { samples: run.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
-        let groups = LightGroups::apart(world.emitters().groups());
-        let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
-        let [a, b]: [LightPictures; 2] =
-            std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
+        let mut render = render_views(world, &[view.camera], &settings, &seeds, &shown)?;
+        let [a, b]: [LightPictures; 2] = std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0)));
         let shown = without_noise(&folder, view, [&a, &b])?;
         report.remarks.extend(remark(&format!("{id} {}", view.id), &render.stats));
         let file = RenderFile {

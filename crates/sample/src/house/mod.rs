@@ -25,14 +25,7 @@ use mateval_dataset::splitmix64;
 use mateval_image::png_io::write_rgb_bytes;
 use serde_json::{Value, json};
 
-/// The house's licence file: CC0 1.0.
-const LICENSE: &str = "This is 'The Sample House' by the MatEval authors, made by `mateval sample`: made up, in the layout\n\
-of 3D-FRONT and 3D-FUTURE, and without anything of theirs.\n\n\
-This scene was released under a CC0 license and is in the public domain.\n\
-It may be copied, modified and used commercially, without permission or\n\
-attribution.\n\n\
-For more information about the license, please see\n\
-https://creativecommons.org/publicdomain/zero/1.0/\n";
+use crate::LICENSE;
 
 pub fn built_in() -> House {
     House {
@@ -77,7 +70,9 @@ pub fn write_shapes(house: &House, out: &Path) -> Result<(), SampleError> {
     write_text(&library.join("model_info.json"), &files::model_info(&house.models))?;
     let json = files::text(files::house_json(house));
     write_text(&layouts.join(format!("{HOUSE_ID}.json")), &json)?;
-    write_text(&root.join("LICENSE.txt"), LICENSE)
+    let what = "This is 'The Sample House' by the MatEval authors, made by `mateval sample`: made up, in the layout\n\
+                of 3D-FRONT and 3D-FUTURE, and without anything of theirs.";
+    write_text(&root.join("LICENSE.txt"), &format!("{what}\n{LICENSE}"))
 }
 
 /// Writes the textures of the architecture and of the models, whose folders exist.

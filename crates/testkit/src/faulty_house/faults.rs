@@ -30,11 +30,11 @@ pub struct Fault {
     pub description: &'static str,
 }
 
-const fn json_fault(name: &'static str, pointer: &'static str, description: &'static str) -> Fault {
+const fn in_json(name: &'static str, pointer: &'static str, description: &'static str) -> Fault {
     Fault { name, place: Place::Json { pointer }, description }
 }
 
-const fn file_fault(name: &'static str, path: &'static str, description: &'static str) -> Fault {
+const fn in_file(name: &'static str, path: &'static str, description: &'static str) -> Fault {
     Fault { name, place: Place::File { path }, description }
 }
 
@@ -47,68 +47,56 @@ macro_rules! in_model {
 
 /// Every fault. All are in the third room, except the normals of two walls and the `local` of the outer walls.
 pub const FAULTS: [Fault; 46] = [
-    json_fault("furniture_uid_repeated", "/furniture/33", "the uid of /furniture/21 again, with another model"),
-    json_fault("category_chinese", "/furniture/17/category", "a category in Chinese, of a valid piece"),
-    json_fault("category_missing", "/furniture/23", "no category"),
-    json_fault("category_null", "/furniture/25/category", "null as category"),
-    json_fault("model_folder_missing", "/furniture/27/jid", "a valid piece whose model has no folder"),
-    json_fault("valid_false", "/furniture/28/valid", "a piece that is not valid, whose model has no folder"),
-    json_fault(
-        "valid_missing",
-        "/furniture/29",
-        "no key that states whether the piece is valid; its model has no folder",
-    ),
-    json_fault("material_jid_local", "/material/7/jid", "'local' instead of a texture's id: only the colour counts"),
-    json_fault("material_texture_object", "/material/9/texture", "an object with an empty value, not a text"),
-    json_fault(
-        "material_normal_texture",
-        "/material/9/normaltexture",
-        "the address of a normal map that does not exist",
-    ),
-    json_fault("material_use_color", "/material/10/useColor", "true: the colour counts, not the texture"),
-    json_fault("material_folder_missing", "/material/11/jid", "the id of a texture that has no folder"),
-    json_fault(
+    in_json("furniture_uid_repeated", "/furniture/33", "the uid of /furniture/21 again, with another model"),
+    in_json("category_chinese", "/furniture/17/category", "a category in Chinese, of a valid piece"),
+    in_json("category_missing", "/furniture/23", "no category"),
+    in_json("category_null", "/furniture/25/category", "null as category"),
+    in_json("model_folder_missing", "/furniture/27/jid", "a valid piece whose model has no folder"),
+    in_json("valid_false", "/furniture/28/valid", "a piece that is not valid, whose model has no folder"),
+    in_json("valid_missing", "/furniture/29", "no key that states whether the piece is valid; its model has no folder"),
+    in_json("material_jid_local", "/material/7/jid", "'local' instead of a texture's id: only the colour counts"),
+    in_json("material_texture_object", "/material/9/texture", "an object with an empty value, not a text"),
+    in_json("material_normal_texture", "/material/9/normaltexture", "the address of a normal map that does not exist"),
+    in_json("material_use_color", "/material/10/useColor", "true: the colour counts, not the texture"),
+    in_json("material_folder_missing", "/material/11/jid", "the id of a texture that has no folder"),
+    in_json(
         "material_jid_empty",
         "/material/12/jid",
         "an empty text instead of a texture's id: only the colour counts",
     ),
-    json_fault("material_uid_repeated", "/material/13", "the uid of /material/0 again, in magenta"),
-    json_fault("mesh_normals_not_unit", "/mesh/2/normal", "positions moved by one where normals should be"),
-    json_fault("mesh_normals_not_unit", "/mesh/8/normal", "positions moved by one where normals should be"),
-    json_fault("mesh_normals_not_unit", "/mesh/56/normal", "positions moved by one where normals should be"),
-    json_fault("mesh_zero_area", "/mesh/52/faces", "two more triangles, both without area"),
-    json_fault("mesh_uv_null", "/mesh/54/uv", "two nulls among the numbers"),
-    json_fault("mesh_aid_text", "/mesh/57/aid", "a text instead of a list"),
-    json_fault("mesh_normals_short", "/mesh/58/normal", "one normal too few"),
-    json_fault("mesh_material_dangles", "/mesh/70/material", "a uid that no material has"),
-    json_fault("mesh_index_out_of_range", "/mesh/71/faces", "one index of a vertex that does not exist"),
-    json_fault("mesh_without_faces", "/mesh/72/faces", "vertices, but no faces"),
-    json_fault("mesh_type_empty", "/mesh/73/type", "an empty text instead of a type"),
-    json_fault("room_without_ceiling", "/scene/room/2", "none of its meshes is a ceiling"),
-    json_fault("scale_uneven", "/scene/room/2/children/24/scale", "1.3 wide, 0.9 deep"),
-    json_fault("rotation_not_unit", "/scene/room/2/children/27/rot", "a quaternion of length 1.58"),
-    json_fault("pieces_intersect", "/scene/room/2/children/32/pos", "the piece intersects that of children/31"),
-    json_fault("scale_mirrors", "/scene/room/2/children/33/scale", "-1 along x: a picture that reads backwards"),
-    json_fault("scale_tiny", "/scene/room/2/children/34/scale", "a millionth"),
-    json_fault("child_without_record", "/scene/room/2/children/41/ref", "a uid that no piece of furniture has"),
-    file_fault("model_not_listed", "3D-FUTURE-model/model_info.json", "no entry for the model whose id ends in 21"),
-    file_fault("texture_alpha_zero", in_model!("14", "texture.png"), "no texel has opacity"),
-    file_fault("texture_truncated", in_model!("15", "texture.png"), "the second half of the file is missing"),
-    file_fault("model_shadow", in_model!("16", "raw_model.obj"), "a group Shadow_001, six metres wide and flat"),
-    file_fault("mtl_misleads", in_model!("17", "model.mtl"), "Kd 0 0 0, Tf 1 1 1, Ke 1 1 1"),
-    file_fault("obj_quads", in_model!("18", "raw_model.obj"), "faces of four corners"),
-    file_fault("obj_blanks", in_model!("18", "raw_model.obj"), "two blanks after v and f"),
-    file_fault("obj_three_uvs", in_model!("18", "raw_model.obj"), "three numbers after vt, lines that end in CRLF"),
-    file_fault("obj_without_materials", in_model!("18", "raw_model.obj"), "neither mtllib nor usemtl"),
-    file_fault("texture_grey_alpha", in_model!("19", "texture.png"), "grey with opacity, not RGBA"),
-    file_fault("model_centimetres", in_model!("20", "raw_model.obj"), "a hundred times too large"),
-    file_fault("texture_missing", in_model!("21", "texture.png"), "no such file"),
-    file_fault("model_drop_shadow", in_model!("22", "raw_model.obj"), "a painted shadow in a group like any other"),
-    file_fault(
-        "model_flat",
-        in_model!("23", "raw_model.obj"),
-        "a mat without thickness, which lies in the floor exactly",
-    ),
+    in_json("material_uid_repeated", "/material/13", "the uid of /material/0 again, in magenta"),
+    in_json("mesh_normals_not_unit", "/mesh/2/normal", "positions moved by one where normals should be"),
+    in_json("mesh_normals_not_unit", "/mesh/8/normal", "positions moved by one where normals should be"),
+    in_json("mesh_normals_not_unit", "/mesh/56/normal", "positions moved by one where normals should be"),
+    in_json("mesh_zero_area", "/mesh/52/faces", "two more triangles, both without area"),
+    in_json("mesh_uv_null", "/mesh/54/uv", "two nulls among the numbers"),
+    in_json("mesh_aid_text", "/mesh/57/aid", "a text instead of a list"),
+    in_json("mesh_normals_short", "/mesh/58/normal", "one normal too few"),
+    in_json("mesh_material_dangles", "/mesh/70/material", "a uid that no material has"),
+    in_json("mesh_index_out_of_range", "/mesh/71/faces", "one index of a vertex that does not exist"),
+    in_json("mesh_without_faces", "/mesh/72/faces", "vertices, but no faces"),
+    in_json("mesh_type_empty", "/mesh/73/type", "an empty text instead of a type"),
+    in_json("room_without_ceiling", "/scene/room/2", "none of its meshes is a ceiling"),
+    in_json("scale_uneven", "/scene/room/2/children/24/scale", "1.3 wide, 0.9 deep"),
+    in_json("rotation_not_unit", "/scene/room/2/children/27/rot", "a quaternion of length 1.58"),
+    in_json("pieces_intersect", "/scene/room/2/children/32/pos", "the piece intersects that of children/31"),
+    in_json("scale_mirrors", "/scene/room/2/children/33/scale", "-1 along x: a picture that reads backwards"),
+    in_json("scale_tiny", "/scene/room/2/children/34/scale", "a millionth"),
+    in_json("child_without_record", "/scene/room/2/children/41/ref", "a uid that no piece of furniture has"),
+    in_file("model_not_listed", "3D-FUTURE-model/model_info.json", "no entry for the model whose id ends in 21"),
+    in_file("texture_alpha_zero", in_model!("14", "texture.png"), "no texel has opacity"),
+    in_file("texture_truncated", in_model!("15", "texture.png"), "the second half of the file is missing"),
+    in_file("model_shadow", in_model!("16", "raw_model.obj"), "a group Shadow_001, six metres wide and flat"),
+    in_file("mtl_misleads", in_model!("17", "model.mtl"), "Kd 0 0 0, Tf 1 1 1, Ke 1 1 1"),
+    in_file("obj_quads", in_model!("18", "raw_model.obj"), "faces of four corners"),
+    in_file("obj_blanks", in_model!("18", "raw_model.obj"), "two blanks after v and f"),
+    in_file("obj_three_uvs", in_model!("18", "raw_model.obj"), "three numbers after vt, lines that end in CRLF"),
+    in_file("obj_without_materials", in_model!("18", "raw_model.obj"), "neither mtllib nor usemtl"),
+    in_file("texture_grey_alpha", in_model!("19", "texture.png"), "grey with opacity, not RGBA"),
+    in_file("model_centimetres", in_model!("20", "raw_model.obj"), "a hundred times too large"),
+    in_file("texture_missing", in_model!("21", "texture.png"), "no such file"),
+    in_file("model_drop_shadow", in_model!("22", "raw_model.obj"), "a painted shadow in a group like any other"),
+    in_file("model_flat", in_model!("23", "raw_model.obj"), "a mat without thickness, which lies in the floor exactly"),
 ];
 
 /// Plants the faults of the JSON.
@@ -127,6 +115,7 @@ fn plant_in_json(house: &mut Value, name: &str, pointer: &str) {
     let remove = |house: &mut Value, key: &str| {
         house.pointer_mut(pointer).unwrap().as_object_mut().unwrap().remove(key).unwrap();
     };
+    let before = house.pointer(pointer).cloned();
     match name {
         "furniture_uid_repeated" => {
             let mut again = house["furniture"][21].clone();
@@ -164,9 +153,10 @@ fn plant_in_json(house: &mut Value, name: &str, pointer: &str) {
         // One triangle names a vertex twice, the other has two vertices at one position.
         "mesh_zero_area" => list(house, pointer).extend([0, 0, 1, 2, 3, 4].map(Value::from)),
         // Sound houses have these too.
-        "valid_false" | "material_jid_local" | "room_without_ceiling" => {}
+        "valid_false" | "material_jid_local" | "room_without_ceiling" => return,
         _ => *house.pointer_mut(pointer).unwrap() = faulty_value(name),
     }
+    assert!(name == "model_folder_missing" || house.pointer(pointer) != before.as_ref(), "{name} changes nothing");
 }
 
 /// A mesh's positions moved by one along z, which some walls of the data have as normals.
@@ -215,7 +205,9 @@ pub(super) fn damage_files(house: &House, root: &Path) {
             }
             _ => {
                 let text = std::fs::read_to_string(&path).unwrap();
-                std::fs::write(&path, damaged_text(fault.name, &text)).unwrap();
+                let damaged = damaged_text(fault.name, &text);
+                assert!(fault.name == "model_flat" || damaged != text, "{} changes nothing", fault.name);
+                std::fs::write(&path, damaged).unwrap();
             }
         }
     }

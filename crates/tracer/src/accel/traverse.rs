@@ -37,7 +37,7 @@ impl Candidate {
 
 /// The state of one ray during traversal. With `ANY` the traversal ends at the first hit found. `ALONE` selects what is
 /// fastest for a single ray, which waits for memory; many rays in turn wait for mispredicted branches instead.
-struct Walk<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> {
+struct Walk<const ANY: bool, const ALONE: bool> {
     box_ray: BoxRay,
     triangle_ray: TriangleRay,
     best: Option<Candidate>,
@@ -48,7 +48,7 @@ struct Walk<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> {
     next: Option<Child>,
 }
 
-impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT, ANY, ALONE> {
+impl<const ANY: bool, const ALONE: bool> Walk<ANY, ALONE> {
     #[inline(always)]
     fn new(wide: &Wide, scene_size: f32, ray: &Ray) -> Self {
         let box_ray = BoxRay::new(ray, scene_size);
@@ -98,7 +98,7 @@ impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT
 
     #[inline(always)]
     fn enter_block<K: Kernel>(&mut self, kernel: K, block: &Block, accept: impl Fn(&Candidate) -> bool) {
-        let found = kernel.triangles::<WATERTIGHT>(block, &self.triangle_ray, self.limit);
+        let found = kernel.triangles(block, &self.triangle_ray, self.limit);
         let mut lanes = found.hit;
         while lanes != 0 {
             let candidate = Candidate::new(block, &found, lanes.trailing_zeros() as usize & (WIDTH - 1));
@@ -117,14 +117,14 @@ impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT
 /// The nearest hit that `accept` returns true for; among equally near hits, the one of lowest triangle index. With
 /// `ANY`, the first such hit found.
 #[inline(always)]
-pub(super) fn traverse<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
+pub(super) fn traverse<K: Kernel, const ANY: bool>(
     kernel: K,
     wide: &Wide,
     scene_size: f32,
     ray: &Ray,
     accept: impl Fn(&Candidate) -> bool,
 ) -> Option<Candidate> {
-    let mut walk = Walk::<WATERTIGHT, ANY, true>::new(wide, scene_size, ray);
+    let mut walk = Walk::<ANY, true>::new(wide, scene_size, ray);
     while let Some(child) = walk.next {
         walk.step(kernel, wide, child, &accept);
         if let Some(top) = walk.stack.top() {
@@ -140,7 +140,7 @@ const AT_ONCE: usize = 12;
 /// [`traverse`] for many rays. `found` is called once per ray, in any order. Several rays are in progress at once and
 /// step in turn: while one waits for memory, the others compute.
 #[inline(always)]
-pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
+pub(super) fn traverse_many<K: Kernel, const ANY: bool>(
     kernel: K,
     wide: &Wide,
     scene_size: f32,
@@ -150,7 +150,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
 ) {
     // Start the first rays.
     let mut waiting = (0..rays.len()).filter(|&which| rays[which].is_usable());
-    let mut walks: ArrayVec<Walk<WATERTIGHT, ANY, false>, AT_ONCE> = ArrayVec::new();
+    let mut walks: ArrayVec<Walk<ANY, false>, AT_ONCE> = ArrayVec::new();
     let mut rays_of = [0; AT_ONCE];
     for which in waiting.by_ref().take(AT_ONCE) {
         rays_of[walks.len()] = which;

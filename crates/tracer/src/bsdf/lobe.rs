@@ -1,18 +1,31 @@
 //! The scattering models behind one enum: parameters looked up at a point, in the frame of the shading normal.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use mateval_dataset::material::{ColorInput, ConductorIor, Material, MaterialModel, Microfacets};
 use mateval_image::Texture;
 
-use super::albedo_tables::{RoughCoat, Table};
+use super::blender_tables::BlenderTables;
 use super::facets::{
     Facets, LocalSample, eta_from_specular, fresnel_conductor, fresnel_dielectric, reflect, reflection,
     reflection_density,
 };
 use super::principled::Principled;
+use super::rough_coat::RoughCoat;
 use crate::sampling;
+
+/// The precomputed values of one material.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Table {
+    /// For Blender's principled.
+    pub(crate) reflection: Option<Arc<BlenderTables>>,
+    /// For rough plastic.
+    pub(crate) coat: Option<Arc<RoughCoat>>,
+    /// For smooth plastic: the fraction of uniform light from inside that its coat reflects back.
+    pub(crate) inside: f32,
+}
 
 /// A material's parameters at one point. Opaque materials expect `wo.z > 0`, dielectrics accept either side.
 #[derive(Clone, Copy, Debug)]

@@ -4,10 +4,11 @@
 //! Evaluation includes the cosine. The choice of a lobe never depends on a colour, so the same paths serve any base
 //! colours.
 
-mod albedo_tables;
+mod blender_tables;
 mod facets;
 mod lobe;
 mod principled;
+mod rough_coat;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -19,10 +20,9 @@ use mateval_image::Texture;
 
 use crate::ray::SurfaceHit;
 use crate::sampling::Frame;
-pub(crate) use albedo_tables::BlenderTables;
-use albedo_tables::Table;
+pub(crate) use blender_tables::BlenderTables;
 pub(crate) use facets::eta_from_specular;
-use lobe::Lobe;
+use lobe::{Lobe, Table};
 pub(crate) use principled::{BsdfPart, Principled};
 use principled::{PrincipledVariants, SecondPrincipled};
 pub(crate) use tables::MaterialTables;
@@ -30,7 +30,7 @@ pub use tables::ReflectanceMeter;
 
 /// The BSDF of a surface at one point, for `K` base colours at once.
 #[derive(Clone, Copy, Debug)]
-pub struct Bsdf<'w, const K: usize = 1> {
+pub(crate) struct Bsdf<'w, const K: usize = 1> {
     frame: Frame,
     /// The geometric normal, on the side of the frame's z axis.
     geometric: Vec3,
@@ -42,28 +42,19 @@ pub struct Bsdf<'w, const K: usize = 1> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BsdfSample<const K: usize = 1> {
+pub(crate) struct BsdfSample<const K: usize = 1> {
     /// Towards the light.
-    pub wi: Vec3,
+    pub(crate) wi: Vec3,
     /// The value of [`Bsdf::evaluate`] over `density`, per base colour.
-    pub weights: [Vec3; K],
+    pub(crate) weights: [Vec3; K],
     /// Per solid angle; for a delta sample, its probability.
-    pub density: f32,
+    pub(crate) density: f32,
     /// Whether the direction comes from a delta distribution, such as a mirror, which light sampling cannot find.
-    pub delta: bool,
+    pub(crate) delta: bool,
 }
 
 /// The smallest cosine between the viewer and a shading normal on the visible side; smaller ones are raised to it.
 const GRAZING: f32 = 1e-3;
-
-impl Bsdf<'_> {
-    /// The value times the cosine of `wi`, per channel, and the density with which [`Self::sample`] samples `wi`, per
-    /// solid angle. Delta lobes are left out. See `Self::evaluate_all`.
-    pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
-        let ([value], density) = self.evaluate_all(wi, BsdfPart::All);
-        (value, density)
-    }
-}
 
 impl<'w, const K: usize> Bsdf<'w, K> {
     /// The BSDF of `material`, with its precomputed `table`, at `hit` on `mesh`, seen from `wo`. It is the same for all
@@ -139,7 +130,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
     ///
     /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's, or the reverse: such
     /// light would pass through the surface.
-    pub(crate) fn evaluate_all(&self, wi: Vec3, part: BsdfPart) -> ([Vec3; K], f32) {
+    pub(crate) fn evaluate(&self, wi: Vec3, part: BsdfPart) -> ([Vec3; K], f32) {
         let local = self.frame.local_from_world(wi);
         if self.geometric.dot(wi) * local.z <= 0.0 {
             return ([Vec3::ZERO; K], 0.0);
@@ -153,7 +144,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
 
     /// Samples a direction from three numbers in [0, 1), independently of the base colours. `None` if the sample is
     /// absorbed.
-    pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
         let (local, weights, density, delta) = match &self.principled {
             Some(variants) => {
                 let (wi, weights, density) = variants.sample(u)?;
@@ -174,7 +165,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         match &self.principled {
             _ if sample.delta => [Vec3::ZERO; K],
             Some(_) => {
-                let (values, _) = self.evaluate_all(sample.wi, BsdfPart::Stage);
+                let (values, _) = self.evaluate(sample.wi, BsdfPart::Stage);
                 values.map(|value| value / sample.density)
             }
             _ => sample.weights,
@@ -182,12 +173,12 @@ impl<'w, const K: usize> Bsdf<'w, K> {
     }
 
     /// Whether all lobes are delta distributions, so that light sampling finds nothing.
-    pub fn is_delta(&self) -> bool {
+    pub(crate) fn is_delta(&self) -> bool {
         self.lobe.is_delta()
     }
 
     /// Whether all light is absorbed.
-    pub fn is_black(&self) -> bool {
+    pub(crate) fn is_black(&self) -> bool {
         matches!(self.lobe, Lobe::Black)
     }
 }

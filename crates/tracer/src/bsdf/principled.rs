@@ -19,7 +19,7 @@ use std::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use mateval_dataset::material::{Distribution, PrincipledFlavour};
 
-use super::albedo_tables::{BlenderTables, FacetAlbedo};
+use super::blender_tables::{BlenderTables, FacetAlbedo};
 use super::facets::{Facets, LocalSample, fresnel_from_thinner, reflect, schlick_weight};
 use crate::sampling;
 
@@ -165,9 +165,8 @@ impl<'w> Principled<'w> {
         let albedo = tables.facet_albedo(self.roughness, wo.z);
         let matt = 1.0 - self.metallic;
         // The light that the dielectric facets reflect, and the light that they leave to the base.
-        let gain = albedo.gain(tables.mean_fresnel());
-        let reflected =
-            albedo.directional * gain * (tables.f0() + (1.0 - tables.f0()) * tables.rise(self.roughness, wo.z));
+        let gain = albedo.gain(tables.mean_fresnel);
+        let reflected = albedo.directional * gain * (tables.f0 + (1.0 - tables.f0) * tables.rise(self.roughness, wo.z));
         let passed = matt * (1.0 - reflected).max(0.0);
         // Metal facets count with the light they keep, whatever their colour.
         let facets = self.metallic * albedo.directional + matt * reflected;

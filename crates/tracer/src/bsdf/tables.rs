@@ -10,9 +10,10 @@ use mateval_dataset::material::{
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene};
 use mateval_image::Texture;
 
-use super::albedo_tables::{BlenderTables, RoughCoat, Table, Widths};
+use super::blender_tables::BlenderTables;
 use super::facets::{diffuse_reflectance, eta_from_specular};
-use super::lobe::Lobe;
+use super::lobe::{Lobe, Table};
+use super::rough_coat::{RoughCoat, Widths};
 use crate::error::{MaterialFault, SceneFault};
 
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::material::UvTransform;
-use mateval_dataset::reference::{EmissionMap, LightIndex, ReferenceScene, SurfaceIndex};
+use mateval_dataset::reference::{EmissionMap, LightIndex, SurfaceIndex};
 use mateval_image::{Texels, Texture};
 
 use crate::error::LightFault;
@@ -131,23 +131,9 @@ impl Outlines {
 }
 
 impl AreaEmitter {
+    /// An emitter of at least one mesh. `surfaces` holds the surface of each mesh; it is empty for a stage light, which
+    /// is no surface of the scene.
     pub(crate) fn new(
-        scene: &ReferenceScene,
-        light: LightIndex,
-        emission: SurfaceEmission,
-        surfaces: Vec<SurfaceIndex>,
-        scene_size: f32,
-    ) -> Self {
-        let meshes: Vec<&TriangleMesh> = surfaces.iter().map(|surface| &scene.surfaces[surface.0].mesh).collect();
-        Self::of_meshes(&meshes, light, emission, surfaces, scene_size)
-    }
-
-    /// A stage light, which is no surface of the scene.
-    pub(crate) fn on_stage(light: LightIndex, emission: SurfaceEmission, mesh: &TriangleMesh, scene_size: f32) -> Self {
-        Self::of_meshes(&[mesh], light, emission, Vec::new(), scene_size)
-    }
-
-    fn of_meshes(
         meshes: &[&TriangleMesh],
         light: LightIndex,
         emission: SurfaceEmission,

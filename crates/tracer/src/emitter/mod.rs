@@ -104,19 +104,25 @@ const LEAST_SKY: f32 = 0.01;
 const SEPARATE_SURFACES: usize = 64;
 
 impl Emitters {
-    /// `scene_size` is the largest absolute coordinate of the scene.
-    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture], scene_size: f32) -> Result<Self, TracerError> {
-        let mut emitters = Self {
+    /// No emitters, for a scene of this many surfaces.
+    fn dark(surfaces: usize, scene_size: f32) -> Self {
+        Self {
             areas: Vec::new(),
             outlines: Outlines::default(),
-            area_of: vec![None; scene.surfaces.len()],
+            area_of: vec![None; surfaces],
             stage: None,
             first_on_stage: 0,
             distant: Vec::new(),
             distant_share: 0.0,
-            camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
+            camera_visible: Vec::new(),
             scene_size,
-        };
+        }
+    }
+
+    /// `scene_size` is the largest absolute coordinate of the scene.
+    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture], scene_size: f32) -> Result<Self, TracerError> {
+        let mut emitters = Self::dark(scene.surfaces.len(), scene_size);
+        emitters.camera_visible = scene.lights.iter().map(|group| group.camera_visible).collect();
         let emitting_surfaces = |emission: &Emission| match emission {
             Emission::Area { surfaces, .. } => surfaces.len(),
             _ => 0,
@@ -160,18 +166,7 @@ impl Emitters {
 
     /// Stage lights only, one group each, for a scene of `surfaces` surfaces.
     pub(crate) fn on_stage(stage: &[StageLight], surfaces: usize, scene_size: f32) -> Result<Self, TracerError> {
-        let dark = Self {
-            areas: Vec::new(),
-            outlines: Outlines::default(),
-            area_of: vec![None; surfaces],
-            stage: None,
-            first_on_stage: 0,
-            distant: Vec::new(),
-            distant_share: 0.0,
-            camera_visible: Vec::new(),
-            scene_size,
-        };
-        dark.with_stage(stage)
+        Self::dark(surfaces, scene_size).with_stage(stage)
     }
 
     /// The same and stage lights, one group each, after the other groups. There are no stage lights yet.
@@ -192,8 +187,8 @@ impl Emitters {
                 return Err(located(LightFault::NoTriangles).into());
             }
             let emission = SurfaceEmission { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
-            let area = AreaEmitter::on_stage(LightIndex(groups + index), emission, &light.mesh, self.scene_size);
-            self.areas.push(Arc::new(area));
+            let group = LightIndex(groups + index);
+            self.areas.push(Arc::new(AreaEmitter::new(&[&light.mesh], group, emission, Vec::new(), self.scene_size)));
         }
         self.outlines = Outlines::new(&self.areas);
         self.camera_visible.extend(stage.iter().map(|_| false));
@@ -223,12 +218,13 @@ impl Emitters {
                     if separate { surfaces.chunks(1).collect() } else { vec![surfaces.as_slice()] };
                 for part in parts {
                     self.claim(part)?;
+                    let meshes: Vec<_> = part.iter().map(|surface| &scene.surfaces[surface.0].mesh).collect();
                     // A surface without triangles is never hit, and no point on it can be sampled.
-                    if part.iter().all(|surface| scene.surfaces[surface.0].mesh.triangles.is_empty()) {
+                    if meshes.iter().all(|mesh| mesh.triangles.is_empty()) {
                         part.iter().for_each(|surface| self.area_of[surface.0] = None);
                         continue;
                     }
-                    let area = AreaEmitter::new(scene, light, emission.clone(), part.to_vec(), self.scene_size);
+                    let area = AreaEmitter::new(&meshes, light, emission.clone(), part.to_vec(), self.scene_size);
                     self.areas.push(Arc::new(area));
                 }
             }
@@ -266,12 +262,12 @@ impl Emitters {
     }
 
     /// Whether the camera sees the emitters of the group.
-    pub fn is_camera_visible(&self, light: LightIndex) -> bool {
+    pub(crate) fn is_camera_visible(&self, light: LightIndex) -> bool {
         self.camera_visible[light.0]
     }
 
     /// The light group that a surface emits for, whichever side is seen.
-    pub fn light_of(&self, surface: SurfaceIndex) -> Option<LightIndex> {
+    pub(crate) fn light_of(&self, surface: SurfaceIndex) -> Option<LightIndex> {
         self.area_of[surface.0].map(|area| self.areas[area].light)
     }
 
@@ -498,31 +494,22 @@ pub(crate) fn escape_share(emitters: &Emitters, first_opaque: impl Fn(&SurfaceHi
 
 #[cfg(test)]
 mod tests {
-    use mateval_dataset::reference::{LightGroup, MaterialIndex, Surface};
+    use mateval_testkit::scenes::{Builder, grey, quad};
 
     use super::*;
 
-    fn triangle(at: Vec3, size: f32) -> Surface {
-        let positions = vec![at, at + Vec3::X * size, at + Vec3::Y * size];
-        let mesh = TriangleMesh { positions, triangles: vec![[0, 1, 2]], ..Default::default() };
-        Surface { name: String::new(), mesh, material: MaterialIndex(0) }
-    }
-
     fn emitters(surfaces: usize, distant: bool) -> (ReferenceScene, Emitters) {
-        let mut scene = ReferenceScene::default();
-        let mut light = |emission: Emission| {
-            scene.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
-        };
+        let mut builder = Builder::default();
         for k in 0..surfaces {
-            let surfaces = vec![SurfaceIndex(k)];
-            light(Emission::Area { surfaces, radiance: [1.0; 3], map: None, two_sided: k % 2 == 0 });
+            let (at, size) = (Vec3::new(k as f32 - 2.0, 0.3 * k as f32, -3.0), 0.2 + 0.2 * k as f32);
+            builder = builder.surface(quad(at, Vec3::X * size, Vec3::Y * size), grey(0.5)).glowing([1.0; 3]);
+            builder = if k % 2 == 0 { builder.on_both_sides() } else { builder };
         }
         if distant {
-            light(Emission::Constant { radiance: [1.0; 3] });
-            light(Emission::Constant { radiance: [2.0; 3] });
+            builder = builder.light(Emission::Constant { radiance: [1.0; 3] });
+            builder = builder.light(Emission::Constant { radiance: [2.0; 3] });
         }
-        let place = |k: usize| triangle(Vec3::new(k as f32 - 2.0, 0.3 * k as f32, -3.0), 0.2 + 0.2 * k as f32);
-        scene.surfaces = (0..surfaces).map(place).collect();
+        let scene = builder.scene();
         let emitters = Emitters::new(&scene, &[], 5.0).unwrap();
         (scene, emitters)
     }

@@ -9,7 +9,6 @@
 mod plane;
 
 use std::array::from_fn;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3, Vec3};
 use mateval_dataset::Camera;
@@ -18,10 +17,10 @@ use mateval_image::Picture;
 use rayon::prelude::*;
 
 use crate::error::{RequestFault, TracerError};
-use crate::light_basis::{LightBasis, LightGroups};
+use crate::light_basis::LightBasis;
 use crate::path::{MaterialSource, OwnMaterials, PathCounts, PathTracer, RenderSettings};
 use crate::ray::Ray;
-use crate::render::{self, RenderStats};
+use crate::render::{self, Progress, RenderStats};
 use crate::sampling::Sampler;
 use crate::world::World;
 use plane::{Numbering, Plane, PlaneView, Window, cell_points};
@@ -30,7 +29,7 @@ use plane::{Numbering, Plane, PlaneView, Window, cell_points};
 #[derive(Clone, Copy, Debug)]
 pub enum Lighting<'a> {
     /// One per group of lights, under the scene's own radiances.
-    Apart(&'a LightGroups),
+    Apart,
     /// For each prediction (or material variant) the same number of mixes, one picture each.
     Mixed(&'a [Vec<LightMix>]),
 }
@@ -43,9 +42,7 @@ pub type LightMix = Vec<[f64; 3]>;
 pub struct ViewsRender {
     /// In the order of the cameras.
     pub views: Vec<ViewLight>,
-    /// The number of path sets per seed: 1 if the views share a centre, otherwise one per view.
-    pub passes: usize,
-    /// Counts over all passes and seeds.
+    /// Counts over all views and seeds.
     pub stats: RenderStats,
 }
 
@@ -53,16 +50,7 @@ pub struct ViewsRender {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewLight {
     /// In the order of the seeds.
-    pub halves: Vec<HalfLight>,
-}
-
-/// One of several independent estimates of a view.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HalfLight {
-    /// Linear radiance: one picture per group of lights, or per mix of lights, by [`Lighting`].
-    pub basis: LightBasis,
-    /// The number of paths that each pixel received.
-    pub counts: Picture<u32>,
+    pub halves: Vec<LightBasis>,
 }
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
@@ -72,19 +60,16 @@ pub struct HalfLight {
 /// number of finished tiles and their total. The bytes of the pictures are the same for any number of threads in the
 /// current rayon pool.
 ///
-/// Fails if a setting is out of range, if a seed occurs twice (two halves would be the same), or if the groups were
-/// made for another number of lights.
+/// Fails if a setting is out of range, or if a seed occurs twice: two halves would be the same.
 pub fn render_views(
     world: &World,
     cameras: &[Camera],
-    groups: &LightGroups,
     settings: &RenderSettings,
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ViewsRender, TracerError> {
-    let lighting = Lighting::Apart(groups);
-    let subject = Subject { world, materials: OwnMaterials(world), first: 0, variants: 1, lighting };
-    let job = ViewsJob { subject, cameras, settings, seeds };
+    let (materials, lighting) = (OwnMaterials(world), Lighting::Apart);
+    let job = ViewsJob { world, materials, first: 0, variants: 1, lighting, cameras, settings, seeds };
     let planes = job.planes(1)?;
     let mut renders = job.render::<1>(&planes, &Progress::new(job.tiles(&planes), progress));
     Ok(renders.pop().expect("there is one variant"))
@@ -98,9 +83,8 @@ pub fn groups_with_one_centre(cameras: &[Camera]) -> Vec<Vec<usize>> {
     planes(cameras, 1).into_iter().map(|group| group.views).collect()
 }
 
-/// The scene to expose: a world with some materials and lighting.
-#[derive(Clone, Copy)]
-pub(crate) struct Subject<'a, M> {
+/// Views to be rendered, of a world with some materials and lighting.
+pub(crate) struct ViewsJob<'a, M> {
     pub(crate) world: &'a World,
     pub(crate) materials: M,
     /// The first of the material variants to trace.
@@ -108,39 +92,16 @@ pub(crate) struct Subject<'a, M> {
     /// The number of variants whose pictures are kept, at most `K`: the others only fill up the tracer's lanes.
     pub(crate) variants: usize,
     pub(crate) lighting: Lighting<'a>,
-}
-
-/// Views to be rendered.
-pub(crate) struct ViewsJob<'a, M> {
-    pub(crate) subject: Subject<'a, M>,
     pub(crate) cameras: &'a [Camera],
     pub(crate) settings: &'a RenderSettings,
     pub(crate) seeds: &'a [u64],
-}
-
-/// Counts finished tiles and reports them.
-pub(crate) struct Progress<'a> {
-    finished: AtomicUsize,
-    total: usize,
-    report: &'a (dyn Fn(usize, usize) + Sync),
-}
-
-impl<'a> Progress<'a> {
-    /// `report` is called with the number of finished tiles and `total`.
-    pub(crate) fn new(total: usize, report: &'a (dyn Fn(usize, usize) + Sync)) -> Self {
-        Self { finished: AtomicUsize::new(0), total, report }
-    }
-
-    fn advance(&self) {
-        (self.report)(self.finished.fetch_add(1, Ordering::Relaxed) + 1, self.total);
-    }
 }
 
 impl<'a, M: Copy> ViewsJob<'a, M> {
     /// Checks the arguments, for `variants` material variants, and returns the planes to expose.
     pub(crate) fn planes(&self, variants: usize) -> Result<Vec<SharedPlane>, TracerError> {
         self.settings.check()?;
-        self.subject.lighting.check(self.subject.world.emitters().groups(), variants)?;
+        self.lighting.check(self.world.emitters().groups(), variants)?;
         check_seeds(self.seeds)?;
         Ok(planes(self.cameras, self.settings.samples))
     }
@@ -155,15 +116,14 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     where
         M: MaterialSource<'a, K> + Sync,
     {
-        let done = || progress.advance();
         let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
-        let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.subject.variants];
+        let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.variants];
         let mut counts = Vec::new();
         // Expose every plane once per seed.
         for &seed in self.seeds {
             let settings = RenderSettings { seed, ..*self.settings };
             for shared in planes {
-                let of_views = expose::<_, K>(self.subject, &shared.plane, &settings, &mut counts, &done);
+                let of_views = expose::<_, K>(self, &shared.plane, &settings, &mut counts, progress);
                 for (view, halves) in shared.views.iter().zip(of_views) {
                     for (views, half) in views.iter_mut().zip(halves) {
                         views[*view].halves.push(half);
@@ -172,11 +132,8 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
             }
         }
         // Attach the counts of each variant.
-        let of_variant = |(variant, views): (usize, Vec<ViewLight>)| ViewsRender {
-            views,
-            passes: planes.len(),
-            stats: stats(&counts, variant),
-        };
+        let of_variant =
+            |(variant, views): (usize, Vec<ViewLight>)| ViewsRender { views, stats: render::stats(&counts, variant) };
         views.into_iter().enumerate().map(of_variant).collect()
     }
 }
@@ -213,33 +170,22 @@ fn check_seeds(seeds: &[u64]) -> Result<(), RequestFault> {
     }
 }
 
-fn stats(tiles: &[TileCounts], variant: usize) -> RenderStats {
-    let paths: Vec<PathCounts> = tiles.iter().map(|tile| tile.path).collect();
-    render::stats(tiles.iter().map(|tile| tile.paths).sum(), &paths, variant)
-}
-
 impl Lighting<'_> {
-    /// The number of pictures per view.
-    fn pictures(&self) -> usize {
+    /// The number of pictures per view of a scene with this many lights.
+    fn pictures(&self, lights: usize) -> usize {
         match self {
-            Self::Apart(groups) => groups.groups().len(),
+            Self::Apart => lights,
             Self::Mixed(mixes) => mixes.first().map_or(0, Vec::len),
         }
     }
 
-    /// Fails unless the lights number `lights` and the mixes `variants`, with finite weights of at least 0.
+    /// Fails unless mixes are for `variants` variants and `lights` lights, with finite weights of at least 0.
     fn check(&self, lights: usize, variants: usize) -> Result<(), RequestFault> {
-        let mixes = match self {
-            Self::Apart(groups) if groups.lights() == lights => return Ok(()),
-            Self::Apart(groups) => {
-                return Err(RequestFault::GroupedLights { found: groups.lights(), expected: lights });
-            }
-            Self::Mixed(mixes) => *mixes,
-        };
+        let Self::Mixed(mixes) = self else { return Ok(()) };
         if mixes.len() != variants {
             return Err(RequestFault::MixedPredictions { found: mixes.len(), expected: variants });
         }
-        let expected = self.pictures();
+        let expected = self.pictures(lights);
         if let Some(prediction) = mixes.iter().position(|mixes| mixes.len() != expected) {
             return Err(RequestFault::MixCount { prediction, found: mixes[prediction].len(), expected });
         }
@@ -259,26 +205,19 @@ fn check_mix(mix: &LightMix, lights: usize) -> Result<(), RequestFault> {
     Ok(())
 }
 
-/// Counts of what happened in one tile.
-#[derive(Clone, Copy, Debug, Default)]
-struct TileCounts {
-    paths: u64,
-    path: PathCounts,
-}
-
 /// Tiles exposed per thread before they are merged. More tiles keep threads busier at the end of a batch and take more
 /// memory.
 const TILES_A_THREAD: usize = 4;
 
 /// Exposes all views of `plane` with the seed of `settings`, per variant. Appends the counts of each tile to `counts`.
 fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
-    subject: Subject<'w, M>,
+    job: &ViewsJob<'w, M>,
     plane: &Plane,
     settings: &RenderSettings,
-    counts: &mut Vec<TileCounts>,
-    done: &(impl Fn() + Sync),
-) -> Vec<Vec<HalfLight>> {
-    let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
+    counts: &mut Vec<PathCounts>,
+    progress: &Progress<'_>,
+) -> Vec<Vec<LightBasis>> {
+    let exposure = Exposure { job, plane, settings, numbering: Numbering::new(plane.most_paths()) };
     let mut films = exposure.blank_films();
     // Tiles are merged in their own order, whichever finishes first; batches limit how many wait in memory.
     for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
@@ -286,7 +225,7 @@ fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
             .par_iter()
             .map(|tile| {
                 let exposed = exposure.tile(tile);
-                done();
+                progress.advance();
                 exposed
             })
             .collect();
@@ -301,7 +240,7 @@ fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
 }
 
 struct Exposure<'w, 'a, M> {
-    subject: Subject<'w, M>,
+    job: &'a ViewsJob<'w, M>,
     plane: &'a Plane,
     settings: &'a RenderSettings,
     numbering: Numbering,
@@ -310,14 +249,13 @@ struct Exposure<'w, 'a, M> {
 /// The contribution of a tile to every view that sees some of it.
 struct ExposedTile<const K: usize> {
     parts: Vec<Option<Part<K>>>,
-    counts: TileCounts,
+    counts: PathCounts,
 }
 
 /// A rectangle of one view: sums for all its pictures, pixel by pixel and variant by variant.
 struct Part<const K: usize> {
     window: Window,
     sums: Vec<[[f64; 3]; K]>,
-    counts: Vec<u32>,
 }
 
 /// The number of paths traced together; slightly more if a cell has several.
@@ -361,16 +299,14 @@ struct PathLight<const K: usize> {
 
 impl<'w, M: Copy> Exposure<'w, '_, M> {
     fn pictures(&self) -> usize {
-        self.subject.lighting.pictures()
+        self.job.lighting.pictures(self.job.world.emitters().groups())
     }
 
-    fn blank_films(&self) -> Vec<Vec<HalfLight>> {
-        let blank = |(width, height): (usize, usize)| HalfLight {
-            basis: LightBasis::black(width, height, self.pictures()),
-            counts: Picture::filled(width, height, 0),
+    fn blank_films(&self) -> Vec<Vec<LightBasis>> {
+        let blank = |PlaneView { intrinsics: k, .. }: &PlaneView| {
+            LightBasis::black(k.width as usize, k.height as usize, self.pictures())
         };
-        let size = |view: &PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
-        self.plane.views().iter().map(size).map(|size| vec![blank(size); self.subject.variants]).collect()
+        self.plane.views.iter().map(|view| vec![blank(view); self.job.variants]).collect()
     }
 
     fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
@@ -378,8 +314,8 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
         M: MaterialSource<'w, K>,
     {
         let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.pictures()));
-        let parts = (0..self.plane.views().len()).map(part).collect();
-        let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
+        let parts = (0..self.plane.views.len()).map(part).collect();
+        let mut exposed = ExposedTile { parts, counts: PathCounts::default() };
         let mut tile_tracer = TileTracer::new(self);
         let mut points = Vec::new();
         for cell in tile.cells() {
@@ -392,12 +328,12 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
             }
         }
         tile_tracer.develop(&mut exposed);
-        exposed.counts.path = tile_tracer.tracer.counts;
+        exposed.counts = tile_tracer.tracer.counts;
         exposed
     }
 
     fn start(&self, path: &PlanePath) -> (Sampler, Ray) {
-        let camera = self.plane.camera();
+        let camera = &self.plane.camera;
         let direction = camera.direction(self.plane.ray_place(path.cell, path.point));
         let ray = Ray::endless(camera.position().as_vec3(), direction.as_vec3());
         (self.numbering.path_sampler(self.settings.seed, path.cell, path.rank), ray)
@@ -406,7 +342,7 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
     /// Adds the light of a path to the views that see it.
     fn splat<const K: usize>(&self, path: &PlanePath, found: &PathLight<K>, parts: &mut [Option<Part<K>>]) {
         let at = self.plane.ray_place(path.cell, path.point);
-        for (view, part) in self.plane.views().iter().zip(parts) {
+        for (view, part) in self.plane.views.iter().zip(parts) {
             let Some(part) = part else { continue };
             let Some(seen) = self.plane.seen(view, at) else { continue };
             if let Some(pixel) = part.pixel(seen.place.x, seen.place.y) {
@@ -418,7 +354,7 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
 
 impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> {
     fn new(exposure: &'a Exposure<'w, 'a, M>) -> Self {
-        let Subject { world, materials, .. } = exposure.subject;
+        let ViewsJob { world, materials, .. } = *exposure.job;
         Self {
             exposure,
             tracer: PathTracer::new(world, materials, *exposure.settings),
@@ -437,8 +373,7 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
         let Self { exposure, tracer, paths, contributions, found } = self;
         let starts = paths.iter().map(|path| exposure.start(path));
         tracer.trace(starts, |path, light, values| contributions.push(Contribution { path, light, values }));
-        let lighting = &exposure.subject.lighting;
-        let first = exposure.subject.first;
+        let ViewsJob { lighting, first, .. } = exposure.job;
         // Paths were traced together; the stable sort keeps the contributions of each path in their order.
         contributions.sort_by_key(|contribution| contribution.path);
         let mut rest = contributions.as_slice();
@@ -446,11 +381,10 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
             let (own, others) = rest.split_at(rest.partition_point(|contribution| contribution.path == which));
             rest = others;
             own.iter().for_each(|contribution| found.add(lighting, contribution));
-            found.mix(lighting, first);
+            found.mix(lighting, *first);
             exposure.splat(path, found, &mut exposed.parts);
             found.clear();
         }
-        exposed.counts.paths += paths.len() as u64;
         paths.clear();
         contributions.clear();
     }
@@ -460,10 +394,12 @@ impl<const K: usize> PathLight<K> {
     fn add(&mut self, lighting: &Lighting<'_>, contribution: &Contribution<K>) {
         let values = contribution.values.map(|value| value.to_array().map(f64::from));
         let sums = match lighting {
-            Lighting::Apart(groups) => {
-                let group = groups.of(contribution.light);
-                self.touch(group);
-                &mut self.sums[group]
+            Lighting::Apart => {
+                let LightIndex(picture) = contribution.light;
+                if !self.touched.contains(&picture) {
+                    self.touched.push(picture);
+                }
+                &mut self.sums[picture]
             }
             Lighting::Mixed(_) => self.of_light(contribution.light),
         };
@@ -498,23 +434,16 @@ impl<const K: usize> PathLight<K> {
         self.lights.clear();
     }
 
-    fn touch(&mut self, picture: usize) {
-        if !self.touched.contains(&picture) {
-            self.touched.push(picture);
-        }
-    }
-
     fn clear(&mut self) {
-        for group in self.touched.drain(..) {
-            self.sums[group] = [[0.0; 3]; K];
+        for picture in self.touched.drain(..) {
+            self.sums[picture] = [[0.0; 3]; K];
         }
     }
 }
 
 impl<const K: usize> Part<K> {
-    fn new(window: Window, groups: usize) -> Self {
-        let area = window.area();
-        Self { window, sums: vec![[[0.0; 3]; K]; area * groups], counts: vec![0; area] }
+    fn new(window: Window, pictures: usize) -> Self {
+        Self { sums: vec![[[0.0; 3]; K]; window.area() * pictures], window }
     }
 
     /// The index within the rectangle of the pixel that contains (x, y), or `None` outside.
@@ -527,24 +456,22 @@ impl<const K: usize> Part<K> {
     }
 
     fn add(&mut self, pixel: usize, found: &PathLight<K>, weight: f64) {
-        self.counts[pixel] += 1;
         let first = pixel * found.sums.len();
-        for &group in &found.touched {
-            let pairs = self.sums[first + group].iter_mut().zip(found.sums[group]);
+        for &picture in &found.touched {
+            let pairs = self.sums[first + picture].iter_mut().zip(found.sums[picture]);
             pairs.for_each(|(sum, value)| add(sum, value, weight));
         }
     }
 
     /// Adds the rectangle to its view. A pixel receives few rectangles, always in the order of the tiles.
-    fn merge_into(&self, films: &mut [HalfLight]) {
+    fn merge_into(&self, films: &mut [LightBasis]) {
         for (k, film) in films.iter_mut().enumerate() {
-            let groups = film.basis.pictures().len();
+            let pictures = film.pictures().len();
             for (place, [x, y]) in self.window.cells().enumerate() {
                 let (x, y) = (x as usize, y as usize);
-                film.counts.set(x, y, film.counts.get(x, y) + self.counts[place]);
-                for (group, picture) in film.basis.pictures_mut().iter_mut().enumerate() {
+                for (at, picture) in film.pictures_mut().iter_mut().enumerate() {
                     let mut pixel = picture.get(x, y);
-                    let sum = self.sums[place * groups + group][k];
+                    let sum = self.sums[place * pictures + at][k];
                     pixel.0.iter_mut().zip(sum).for_each(|(pixel, sum)| *pixel += sum as f32);
                     picture.set(x, y, pixel);
                 }

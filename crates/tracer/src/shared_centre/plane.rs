@@ -11,8 +11,8 @@ use crate::sampling::Sampler;
 /// The part of the first camera's image plane that any view sees, divided into cells of that camera's pixels.
 #[derive(Clone, Debug)]
 pub(crate) struct Plane {
-    camera: Camera,
-    views: Vec<PlaneView>,
+    pub(super) camera: Camera,
+    pub(super) views: Vec<PlaneView>,
     samples: u32,
     /// Columns of cells, in pixels of the camera; negative to the left of its picture.
     columns: Range<i32>,
@@ -63,27 +63,22 @@ impl Plane {
     /// The same plane for one more view. `None` if its camera has another centre, or looks too far away from where the
     /// first looks.
     pub(super) fn with(&self, camera: &Camera) -> Option<Self> {
-        let mut plane = self.clone();
-        plane.include(camera)?;
-        Some(plane)
-    }
-
-    fn include(&mut self, camera: &Camera) -> Option<()> {
         let centre = self.camera.position();
         if centre.distance(camera.position()) > ORIGIN_ROUNDING * centre.abs().max_element().max(1.0) {
             return None;
         }
+        let mut plane = self.clone();
         let plane_from_view = self.camera.rotation().transpose() * camera.rotation();
         let Intrinsics { width, height, fx, fy, .. } = camera.intrinsics;
         let own = self.camera.intrinsics;
         for corner in [[0, 0], [width, 0], [0, height], [width, height]] {
             let corner = DVec2::new(f64::from(corner[0]), f64::from(corner[1]));
-            self.grow(plane_from_view * camera.camera_direction(corner).normalize())?;
+            plane.grow(plane_from_view * camera.camera_direction(corner).normalize())?;
         }
         let scale = fx * fy / (own.fx * own.fy);
         let turn = Some(plane_from_view.transpose());
-        self.views.push(PlaneView { intrinsics: camera.intrinsics, turn, scale });
-        Some(())
+        plane.views.push(PlaneView { intrinsics: camera.intrinsics, turn, scale });
+        Some(plane)
     }
 
     /// Extends the plane to contain `direction`, given in the space of the plane's camera.
@@ -98,14 +93,6 @@ impl Plane {
         widen(&mut self.columns, place.x);
         widen(&mut self.rows, place.y);
         Some(())
-    }
-
-    pub(super) fn views(&self) -> &[PlaneView] {
-        &self.views
-    }
-
-    pub(super) fn camera(&self) -> &Camera {
-        &self.camera
     }
 
     /// The tiles of the plane, row by row.

@@ -7,26 +7,15 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use mateval_dataset::material::{
-    ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
+    ColorInput, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
 };
 use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture, SurfaceIndex};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
-use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use mateval_testkit::statistics::{Renders, chi_square_z};
-use mateval_tracer::accel::{Accel, InstructionSet};
-use mateval_tracer::{LightGroups, LightSampling, Ray, RenderSettings, Sampler, World, render, render_views};
+use mateval_testkit::scenes::{Builder, camera, grey, material, metal, principled, quad, room, sphere};
+use mateval_testkit::statistics::{Renders, counts_z};
+use mateval_tracer::{Accel, LightBasis, LightSampling, Ray, RenderSettings, Sampler, World, render, render_views};
 use sha2::{Digest, Sha256};
-
-fn principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
-    MaterialModel::Principled {
-        base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
-        roughness: ScalarInput::Constant(roughness),
-        metallic: ScalarInput::Constant(metallic),
-        specular: 0.5,
-        flavour,
-    }
-}
 
 /// A room open to an environment map on one side, with a lamp, a large metal sphere, a rough plastic box and a frosted
 /// pane.
@@ -47,39 +36,34 @@ pub fn scene(brightness: f32) -> ReferenceScene {
         specular_transmittance: ColorInput::Constant([1.0; 3]),
         microfacets: facets,
     };
-    let metal = MaterialModel::Conductor {
-        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
-        specular_reflectance: ColorInput::Constant([1.0; 3]),
-        microfacets: facets,
-    };
+    let glossy = |roughness, metallic, flavour| material(principled([0.7, 0.5, 0.3], roughness, metallic, flavour));
     let mut builder = Builder::default();
     for (index, wall) in walls.into_iter().enumerate() {
         builder = match index {
-            0 => builder.surface(wall, material(principled(0.4, 0.0, PrincipledFlavour::Blender))),
+            0 => builder.surface(wall, glossy(0.4, 0.0, PrincipledFlavour::Blender)),
             2 => builder.surface(wall, material(plastic)),
             _ => builder.surface(wall, grey(0.6)),
         };
     }
-    let mut scene = builder
-        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal))
-        .surface(
-            sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12),
-            material(principled(0.3, 1.0, PrincipledFlavour::Mitsuba)),
-        )
+    let scene = builder
+        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal(Some(0.2))))
+        .surface(sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12), glossy(0.3, 1.0, PrincipledFlavour::Mitsuba))
         .surface(quad(Vec3::new(-0.9, -0.4, 0.3), Vec3::X * 0.6, Vec3::Y * 0.8), material(frosted))
         .surface(quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8), grey(0.0))
         .glowing([4.0 * brightness; 3])
         .scene();
+    under_sky(scene, brightness)
+}
+
+/// A scene without textures under a map with a bright spot.
+pub fn under_sky(mut scene: ReferenceScene, scale: f32) -> ReferenceScene {
     let texels = (0..16 * 8).map(|k| if k == 60 { [20.0; 3] } else { [0.3; 3] }).collect();
-    scene.textures.push(SourceTexture {
-        name: String::new(),
-        sha256: None,
-        texture: Texture::new(16, 8, Texels::Linear(texels), Wrap::Repeat).unwrap(),
-    });
+    let texture = Texture::new(16, 8, Texels::Linear(texels), Wrap::Repeat).unwrap();
+    scene.textures.push(SourceTexture { name: String::new(), sha256: None, texture });
     let world_from_environment = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let sky = Emission::Environment { texture: TextureIndex(0), scale: brightness, world_from_environment };
-    scene.lights.extend(Builder::default().light(sky).scene().lights);
-    scene
+    Builder::from(scene)
+        .light(Emission::Environment { texture: TextureIndex(0), scale, world_from_environment })
+        .scene()
 }
 
 pub fn view() -> Camera {
@@ -127,22 +111,17 @@ fn ways_of_sampling_agree() {
 /// other shares.
 #[test]
 fn directions_to_lights_follow_their_density() {
-    let mut scene = scene(1.0);
     // Only lamps and the map, so that nothing blocks light.
     let lamps = [
         quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8),
         quad(Vec3::new(-0.9, -0.2, -0.9), Vec3::Y * 0.5, Vec3::Z * 0.7),
         sphere(Vec3::new(0.6, -0.6, 0.3), 0.2, 10),
     ];
-    let map = scene.lights.pop().unwrap();
     let mut builder = Builder::default();
     for lamp in lamps {
         builder = builder.surface(lamp, grey(0.0)).glowing([1.0; 3]);
     }
-    let mut lit = builder.scene();
-    lit.textures = std::mem::take(&mut scene.textures);
-    lit.lights.push(map);
-    let world = World::new(Arc::new(lit)).unwrap();
+    let world = World::new(Arc::new(under_sky(builder.scene(), 1.0))).unwrap();
     let from = Vec3::new(0.1, 0.05, 0.2);
     let shared = world.with_group_shares(&view(), &[0.2, 5.0, 1.0, 1.0]);
     let [expected, elsewhere] = [from, from + Vec3::X * 0.1].map(|place| light_density(&world, place));
@@ -189,8 +168,7 @@ fn light_density(world: &World, from: Vec3) -> Vec<f64> {
     cells
 }
 
-/// The deviation of light samples from `expected`, as a standard normal (Wilson and Hilferty). Samples that find
-/// nothing (backs of lamps) and cells with fewer than 10 expected samples are pooled.
+/// The deviation of light samples from `expected`, as a standard normal. Samples of the backs of lamps find nothing.
 fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
     const COUNT: u32 = 40_000;
     let mut found = vec![0.0_f64; ROWS * COLUMNS];
@@ -204,19 +182,7 @@ fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
         let row = (((d.z + 1.0) * 0.5 * ROWS as f32) as usize).min(ROWS - 1);
         found[row * COLUMNS + column] += 1.0;
     }
-    let n = f64::from(COUNT);
-    let rest = [n - found.iter().sum::<f64>(), n * (1.0 - expected.iter().sum::<f64>())];
-    let (mut statistic, mut freedom, mut pooled) = (0.0, 0.0, rest);
-    for (found, expected) in found.iter().zip(expected) {
-        if n * expected >= 10.0 {
-            statistic += (found - n * expected).powi(2) / (n * expected);
-            freedom += 1.0;
-        } else {
-            pooled = [pooled[0] + found, pooled[1] + n * expected];
-        }
-    }
-    statistic += (pooled[0] - pooled[1]).powi(2) / pooled[1].max(10.0);
-    chi_square_z(statistic / freedom, freedom)
+    counts_z(&found, expected, COUNT)
 }
 
 #[test]
@@ -270,6 +236,8 @@ fn bad_scenes_are_refused() {
     refused(|s| s.surfaces[1].material.0 = 99, "surface 1");
     refused(|s| s.surfaces[2].mesh.uvs = Some(vec![]), "surface 2");
     refused(|s| s.surfaces[2].mesh.normals = Some(vec![Vec3::NAN; 4]), "surface 2");
+    refused(|s| s.surfaces[1].mesh.positions[2] = Vec3::INFINITY, "invalid scene: surface 1: vertex 2");
+    refused(|s| s.surfaces[2].mesh.positions[3].y = f32::NAN, "surface 2: vertex 3");
     refused(|s| s.surfaces[3].mesh = TriangleMesh { triangles: vec![[7, 0, 1]], ..Default::default() }, "surface 3");
     refused(|s| s.lights[0].emission = Emission::Constant { radiance: [f32::NAN; 3] }, "light 0");
     refused(|s| s.lights.push(s.lights[0].clone()), "light 2");
@@ -328,34 +296,24 @@ fn hash<'a>(pictures: impl IntoIterator<Item = &'a Picture<LinearRgb>>) -> Strin
 fn hashes(world: &World, threads: usize) -> [String; 2] {
     let settings = RenderSettings { samples: 4, seed: 3, ..Default::default() };
     let views = [view(), view().turned(5.0, -5.0)];
-    let groups = LightGroups::apart(world.scene().lights.len());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let (picture, views) = pool.install(|| {
         let picture = render(world, &views[0], &settings, &|_, _| ()).unwrap().picture;
-        (picture, render_views(world, &views, &groups, &settings, &[4, 5], &|_, _| ()).unwrap().views)
+        (picture, render_views(world, &views, &settings, &[4, 5], &|_, _| ()).unwrap().views)
     });
     let halves = views.iter().flat_map(|view| &view.halves);
-    [hash([&picture]), hash(halves.flat_map(|half| half.basis.pictures()))]
+    [hash([&picture]), hash(halves.flat_map(LightBasis::pictures))]
 }
 
-/// The scene with a hierarchy that uses the given instructions, or `None` if the machine lacks them.
-fn world(scene: &Arc<ReferenceScene>, instructions: InstructionSet) -> Option<World> {
-    let meshes: Vec<&TriangleMesh> = scene.surfaces.iter().map(|surface| &surface.mesh).collect();
-    let accel = Accel::build(&meshes).unwrap().with_instructions(instructions)?;
-    Some(World::sharing(scene.clone(), Arc::new(accel)).unwrap())
-}
-
+/// With this machine's fastest instructions and with portable ones.
 #[test]
 fn pictures_are_those_stored() {
     let scene = Arc::new(scene(1.0));
-    for instructions in [InstructionSet::Avx2, InstructionSet::Portable] {
-        let Some(world) = world(&scene, instructions) else {
-            mateval_testkit::say_skipped(&format!("this machine has no {instructions:?}"));
-            continue;
-        };
-        for threads in [1, 2, 7] {
-            assert_eq!(hashes(&world, threads), [RENDER, VIEWS], "{instructions:?}, {threads} threads");
-        }
+    let meshes: Vec<&TriangleMesh> = scene.surfaces.iter().map(|surface| &surface.mesh).collect();
+    let accel = Arc::new(Accel::build(&meshes).unwrap().portable());
+    let portable = World::sharing(scene.clone(), accel).unwrap();
+    for (threads, world) in [(1, &portable), (2, &World::new(scene.clone()).unwrap()), (7, &portable)] {
+        assert_eq!(hashes(world, threads), [RENDER, VIEWS], "{threads} threads");
     }
 }
 

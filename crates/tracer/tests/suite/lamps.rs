@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use mateval_dataset::material::{ColorInput, ConductorIor, MaterialModel, TextureIndex, UvTransform};
-use mateval_dataset::reference::{Emission, ReferenceScene, SourceTexture};
+use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap};
-use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::scenes::{Builder, camera, grey, material, metal, quad, room, sphere};
 use mateval_testkit::statistics::Renders;
-use mateval_tracer::{LightBasis, LightGroups, LightSampling, RenderSettings, Sampler, World, render, render_views};
+use mateval_tracer::{LightBasis, LightSampling, RenderSettings, Sampler, World, render, render_views};
 
 use super::estimators::{self, view, worst};
+use super::views::variances;
 
 fn settings(samples: u32, seed: u64) -> RenderSettings {
     RenderSettings { samples, seed, max_bounces: 6, ..Default::default() }
@@ -38,15 +39,10 @@ fn lamp() -> TriangleMesh {
 
 /// A room with a sphere, without the lamp below its ceiling.
 fn furnished() -> Builder {
-    let metal = MaterialModel::Conductor {
-        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
-        specular_reflectance: ColorInput::Constant([1.0; 3]),
-        microfacets: None,
-    };
     let mut walls = room();
     walls.truncate(5);
     let builder = walls.into_iter().fold(Builder::default(), |builder, wall| builder.surface(wall, grey(0.6)));
-    builder.surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.4, 16), material(metal))
+    builder.surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.4, 16), material(metal(None)))
 }
 
 /// The lamp's map has many strongly differing texels, some of them black, and is repeated and skewed. The lamp reflects
@@ -210,13 +206,13 @@ fn a_weighted_basis_is_a_render() {
         (0..3).for_each(|c| radiance[c] *= weights[0][c]);
         World::new(Arc::new(scene)).unwrap()
     };
-    let basis = |world: &World, groups: &LightGroups| -> LightBasis {
+    let basis = |world: &World| -> LightBasis {
         let views = [view(), view().turned(5.0, -5.0)];
-        let mut done = render_views(world, &views, groups, &settings(8, 0), &[5], &|_, _| ()).unwrap();
-        done.views.remove(1).halves.remove(0).basis
+        let mut done = render_views(world, &views, &settings(8, 0), &[5], &|_, _| ()).unwrap();
+        done.views.remove(1).halves.remove(0)
     };
-    let apart = basis(&lit([[1.0; 3]; 2]), &LightGroups::apart(2));
-    let direct = basis(&lit([[0.2, 0.5, 3.0], [0.7; 3]]), &LightGroups::together(2)).sum();
+    let apart = basis(&lit([[1.0; 3]; 2]));
+    let direct = basis(&lit([[0.2, 0.5, 3.0], [0.7; 3]])).sum();
     let difference = |weights: &[[f64; 3]]| {
         let weighted = apart.weighted(weights).unwrap();
         let channels = |p: &Picture<LinearRgb>| p.pixels().iter().flat_map(|v| v.0).collect::<Vec<f32>>();
@@ -283,18 +279,11 @@ fn lit(surfaces: Vec<TriangleMesh>) -> ReferenceScene {
 }
 
 /// The same under a sky: a map with a bright spot, or constant radiance.
-fn under_sky(mut scene: ReferenceScene, map: bool) -> ReferenceScene {
-    let sky = if map {
-        let texels = (0..16 * 8).map(|k| if k == 60 { [20.0; 3] } else { [0.3; 3] }).collect();
-        let texture = Texture::new(16, 8, Texels::Linear(texels), Wrap::Repeat).unwrap();
-        scene.textures.push(SourceTexture { name: String::new(), sha256: None, texture });
-        let world_from_environment = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        Emission::Environment { texture: TextureIndex(0), scale: 1.0, world_from_environment }
-    } else {
-        Emission::Constant { radiance: [1.0; 3] }
-    };
-    scene.lights.extend(Builder::default().light(sky).scene().lights);
-    scene
+fn under_sky(scene: ReferenceScene, map: bool) -> ReferenceScene {
+    if map {
+        return estimators::under_sky(scene, 1.0);
+    }
+    Builder::from(scene).light(Emission::Constant { radiance: [1.0; 3] }).scene()
 }
 
 fn world(scene: ReferenceScene) -> World {
@@ -348,17 +337,10 @@ fn renders(scene: ReferenceScene, light_sampling: LightSampling, samples: u32, s
     Renders::new(&world(scene), &view, settings, 16)
 }
 
-/// The mean over pixels of the variance between renders.
+/// The mean variance between renders of a pixel's channel.
 fn variance(renders: &Renders) -> f64 {
-    let pictures = renders.pictures();
-    let count = pictures.len() as f64;
-    let pixels = pictures[0].pixels().len();
-    let of_pixel = |at: usize| {
-        let values: Vec<f64> = pictures.iter().map(|picture| f64::from(picture.pixels()[at].0[1])).collect();
-        let mean = values.iter().sum::<f64>() / count;
-        values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (count - 1.0)
-    };
-    (0..pixels).map(of_pixel).sum::<f64>() / pixels as f64
+    let variances = variances(renders);
+    variances.iter().sum::<f64>() / variances.len() as f64
 }
 
 /// A sky that no ray reaches leaves the noise of a closed room as it is. The twin: half of the samples cost it more than half

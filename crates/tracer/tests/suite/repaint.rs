@@ -3,16 +3,18 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use mateval_dataset::material::{ColorInput, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_dataset::material::PrincipledFlavour;
 use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_tracer::{Coat, LightGroups, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World};
+use mateval_tracer::{
+    Coat, LightBasis, LightMix, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World,
+};
 use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_views};
 
 use super::estimators::worst;
 use super::views::{lit_room, view};
-use mateval_testkit::scenes::{Builder, camera, grey, material, quad};
+use mateval_testkit::scenes::{Builder, camera, grey, material, principled, quad};
 use mateval_testkit::statistics::Renders;
 
 const COLORS: [[f32; 3]; 3] = [[0.6, 0.5, 0.4], [0.0, 0.9, 0.1], [1.0, 1.0, 1.0]];
@@ -21,13 +23,16 @@ fn flat(value: [f32; 3]) -> Texture {
     Texture::new(1, 1, Texels::Linear(vec![value]), Wrap::Clamp).unwrap()
 }
 
+fn scattering(roughness: f32, metallic: f32) -> Scattering {
+    Scattering { roughness: flat([roughness; 3]), metallic: flat([metallic; 3]) }
+}
+
 /// One coat with these colours on all walls and lamps; the metal sphere keeps its own material.
 fn coats(scene: &ReferenceScene, colors: &[[f32; 3]], roughness: f32, metallic: f32) -> Vec<Option<Coat>> {
     let coat = |mesh: &TriangleMesh| {
         mesh.uvs.as_ref().map(|_| Coat {
             base_colors: colors.iter().map(|color| flat(*color)).collect(),
-            roughness: flat([roughness; 3]),
-            metallic: flat([metallic; 3]),
+            scattering: scattering(roughness, metallic),
         })
     };
     scene.surfaces.iter().map(|surface| coat(&surface.mesh)).collect()
@@ -41,22 +46,14 @@ fn atlases(scene: &ReferenceScene) -> Vec<TriangleMesh> {
 fn principled_room(color: [f32; 3], roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> ReferenceScene {
     let mut scene = lit_room([[1.0; 3]; 4]);
     for surface in scene.surfaces.iter().filter(|surface| surface.mesh.uvs.is_some()) {
-        scene.materials[surface.material.0] = material(MaterialModel::Principled {
-            base_color: ColorInput::Constant(color),
-            roughness: ScalarInput::Constant(roughness),
-            metallic: ScalarInput::Constant(metallic),
-            specular: 0.5,
-            flavour,
-        });
+        scene.materials[surface.material.0] = material(principled(color, roughness, metallic, flavour));
     }
     scene
 }
 
-fn repainted(world: &World, repaint: &Repaint, which: std::ops::Range<usize>) -> Vec<ViewsRender> {
-    let groups = LightGroups::apart(world.emitters().groups());
-    let lighting = Lighting::Apart(&groups);
+fn repainted(world: &World, repaint: &Repaint, lighting: Lighting<'_>) -> Vec<ViewsRender> {
     let settings = RenderSettings { samples: 4, ..Default::default() };
-    render_repainted(world, repaint, which, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap()
+    render_repainted(world, repaint, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap()
 }
 
 /// A repainted room equals a room built with that material, bit for bit, and a prediction rendered beside others equals
@@ -68,16 +65,18 @@ fn paint_is_the_material_itself_and_company_changes_nothing() {
     for (flavour, roughness, metallic) in
         [(PrincipledFlavour::Blender, 0.4, 0.5), (PrincipledFlavour::Mitsuba, 0.7, 0.0)]
     {
-        let repaint = Repaint::new(&world, &atlases(&scene), coats(&scene, &COLORS, roughness, metallic), flavour);
-        let repaint = repaint.unwrap();
-        let together = repainted(&world, &repaint, 0..3);
+        let painted = |colors: &[[f32; 3]]| {
+            let coats = coats(&scene, colors, roughness, metallic);
+            let repaint = Repaint::new(&world, &atlases(&scene), coats, flavour).unwrap();
+            repainted(&world, &repaint, Lighting::Apart)
+        };
+        let together = painted(&COLORS);
         for (index, color) in COLORS.into_iter().enumerate() {
             let built = World::new(Arc::new(principled_room(color, roughness, metallic, flavour))).unwrap();
             let settings = RenderSettings { samples: 4, ..Default::default() };
-            let groups = LightGroups::apart(4);
-            let own = render_views(&built, &[view(24)], &groups, &settings, &[3, 4], &|_, _| ()).unwrap();
+            let own = render_views(&built, &[view(24)], &settings, &[3, 4], &|_, _| ()).unwrap();
             assert_eq!(together[index].views, own.views, "{flavour:?} {color:?}");
-            assert_eq!(together[index].views, repainted(&world, &repaint, index..index + 1)[0].views);
+            assert_eq!(together[index].views, painted(&[color])[0].views);
         }
         assert_ne!(together[0].views, together[1].views, "the twin passes");
     }
@@ -95,19 +94,20 @@ fn two_roughnesses_share_paths_without_bias() {
         Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap()
     };
     let second = |(roughness, metallic): (f32, f32)| -> Vec<Option<Scattering>> {
-        let scattering = Scattering { roughness: flat([roughness; 3]), metallic: flat([metallic; 3]) };
-        scene.surfaces.iter().map(|surface| surface.mesh.uvs.as_ref().map(|_| scattering.clone())).collect()
+        scene
+            .surfaces
+            .iter()
+            .map(|surface| surface.mesh.uvs.as_ref().map(|_| scattering(roughness, metallic)))
+            .collect()
     };
     let renders = |repaint: &Repaint, first_seed: u64| -> Vec<Renders> {
-        let groups = LightGroups::together(4);
         let settings = RenderSettings { samples: 64, ..Default::default() };
         let seeds: Vec<u64> = (first_seed..first_seed + 16).collect();
-        let lighting = Lighting::Apart(&groups);
         let done =
-            render_repainted(&world, repaint, 0..2, &[view(32)], lighting, &settings, &seeds, &|_, _| ()).unwrap();
+            render_repainted(&world, repaint, &[view(32)], Lighting::Apart, &settings, &seeds, &|_, _| ()).unwrap();
         let pictures = |render: ViewsRender| {
             let [view] = <[_; 1]>::try_from(render.views).unwrap();
-            Renders::from_pictures(view.halves.into_iter().map(|half| half.basis.sum()))
+            Renders::from_pictures(view.halves.iter().map(LightBasis::sum))
         };
         done.into_iter().map(pictures).collect()
     };
@@ -134,14 +134,11 @@ fn mixes_are_those_of_the_basis() {
     let repaint = Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap();
     let odd = vec![[0.0, 1.0, 0.0], [2.0; 3], [0.1; 3], [1.0, 0.0, 3.0]];
     let mixes = [vec![vec![[0.5, 1.0, 2.0]; 4], vec![[1.0; 3]; 4]], vec![odd, vec![[0.3; 3]; 4]]];
-    let lighting = Lighting::Mixed(&mixes);
-    let settings = RenderSettings { samples: 4, ..Default::default() };
-    let mixed =
-        render_repainted(&world, &repaint, 0..2, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap();
-    for (k, apart) in repainted(&world, &repaint, 0..2).iter().enumerate() {
+    let mixed = repainted(&world, &repaint, Lighting::Mixed(&mixes));
+    for (k, apart) in repainted(&world, &repaint, Lighting::Apart).iter().enumerate() {
         for (picture, mix) in mixes[k].iter().enumerate() {
-            let expected = apart.views[0].halves[1].basis.weighted(mix).unwrap();
-            let found = &mixed[k].views[0].halves[1].basis.pictures()[picture];
+            let expected = apart.views[0].halves[1].weighted(mix).unwrap();
+            let found = &mixed[k].views[0].halves[1].pictures()[picture];
             let pairs = expected.pixels().iter().zip(found.pixels());
             for (a, b) in pairs.flat_map(|(a, b)| a.0.into_iter().zip(b.0)) {
                 assert!((a - b).abs() <= 1e-5 * a.max(0.1), "{a} {b}");
@@ -171,16 +168,16 @@ fn what_does_not_fit_is_refused() {
     unmapped[0].uvs = None;
     assert!(new(&unmapped, good.clone()).contains("surface 0"));
     let repaint = Repaint::new(&world, &atlases, good, PrincipledFlavour::Blender).unwrap();
-    let groups = LightGroups::together(4);
-    let fails = |which, lighting: Lighting<'_>| {
-        let settings = RenderSettings::default();
-        render_repainted(&world, &repaint, which, &[view(8)], lighting, &settings, &[1], &|_, _| ()).is_err()
+    let fails = |world: &World, mixes: &[Vec<LightMix>]| {
+        let settings = RenderSettings { samples: 1, ..Default::default() };
+        let lighting = Lighting::Mixed(mixes);
+        render_repainted(world, &repaint, &[view(8)], lighting, &settings, &[1], &|_, _| ()).is_err()
     };
-    assert!(fails(0..4, Lighting::Apart(&groups)));
-    assert!(fails(0..1, Lighting::Apart(&LightGroups::together(3))));
-    assert!(fails(0..1, Lighting::Mixed(&[vec![vec![[1.0; 3]; 4]]])));
-    assert!(fails(0..1, Lighting::Mixed(&vec![vec![vec![[-1.0; 3]; 4]]; 3])));
-    assert!(!fails(0..1, Lighting::Mixed(&vec![vec![vec![[1.0; 3]; 4]]; 3])));
+    let sound = vec![vec![vec![[1.0; 3]; 4]]; 3];
+    assert!(!fails(&world, &sound));
+    assert!(fails(&Builder::default().world(), &sound));
+    assert!(fails(&world, &sound[..1]));
+    assert!(fails(&world, &vec![vec![vec![[-1.0; 3]; 4]]; 3]));
 }
 
 /// A square stage light above a floor, with a camera that looks straight down through it.
@@ -226,13 +223,7 @@ fn a_stage_lights_the_floor_and_hides_nothing() {
 /// stage, or as a surface of the scene.
 fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, staged: bool) -> f64 {
     let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
-    let model = MaterialModel::Principled {
-        base_color: ColorInput::Constant([color; 3]),
-        roughness: ScalarInput::Constant(roughness),
-        metallic: ScalarInput::Constant(metallic),
-        specular: 0.5,
-        flavour,
-    };
+    let model = principled([color; 3], roughness, metallic, flavour);
     let lamp = quad(Vec3::new(-0.5, 3.0, -0.5), Vec3::X, Vec3::Z);
     let camera = camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5);
     let builder = Builder::default().surface(floor, material(model));
@@ -272,13 +263,7 @@ fn metal_is_matt_on_a_stage() {
 
 /// A room of matt walls with a smooth floor, and a stage of two lights, one of them 2 mm in front of the back wall.
 fn room_on_stage() -> World {
-    let smooth = MaterialModel::Principled {
-        base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
-        roughness: ScalarInput::Constant(0.1),
-        metallic: ScalarInput::Constant(0.3),
-        specular: 0.5,
-        flavour: PrincipledFlavour::Blender,
-    };
+    let smooth = principled([0.7, 0.5, 0.3], 0.1, 0.3, PrincipledFlavour::Blender);
     let floor = quad(Vec3::new(-0.9, -0.9, -0.998), Vec3::Z * 1.8, Vec3::X * 1.8);
     let world = World::new(Arc::new(lit_room([[1.0; 3]; 4]))).unwrap();
     let scene = Builder::from(world.scene().clone()).surface(floor, material(smooth)).scene();

@@ -47,9 +47,9 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
+    fn triangles(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
         // SAFETY: `self` proves that the processor supports the instructions.
-        if WATERTIGHT { unsafe { watertight(block, ray, limit) } } else { unsafe { fast(block, ray, limit) } }
+        unsafe { watertight(block, ray, limit) }
     }
 }
 
@@ -175,55 +175,6 @@ fn difference(p: Vectors, q: Vectors) -> __m256 {
     let product = _mm256_mul_ps(p[1], q[0]);
     let lost = _mm256_fnmadd_ps(p[1], q[0], product);
     _mm256_add_ps(_mm256_fmsub_ps(p[0], q[1], product), lost)
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline]
-fn fast(block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
-    let (direction, origin) = (vectors(ray.direction), vectors(ray.origin));
-    let corner = |which: usize| {
-        let [x, y, z] = &block.corners[which];
-        [load(x), load(y), load(z)]
-    };
-    let (a, b, c) = (corner(0), corner(1), corner(2));
-    let (first, second) = (minus(b, a), minus(c, a));
-    let across = cross(direction, second);
-    let determinant = dot(first, across);
-    let from = minus(origin, a);
-    let v = dot(from, across);
-    let along = cross(from, first);
-    let w = dot(direction, along);
-    let u = _mm256_sub_ps(_mm256_sub_ps(determinant, v), w);
-    let inside = inside([u, v, w], determinant);
-    if inside == 0 {
-        return NONE;
-    }
-    found(inside, _mm256_div_ps(dot(second, along), determinant), limit, [u, v, w])
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline]
-fn vectors([x, y, z]: [f32; 3]) -> Vectors {
-    [_mm256_set1_ps(x), _mm256_set1_ps(y), _mm256_set1_ps(z)]
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline]
-fn minus(p: Vectors, q: Vectors) -> Vectors {
-    [_mm256_sub_ps(p[0], q[0]), _mm256_sub_ps(p[1], q[1]), _mm256_sub_ps(p[2], q[2])]
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline]
-fn cross(p: Vectors, q: Vectors) -> Vectors {
-    let part = |i: usize, j: usize| _mm256_fmsub_ps(p[i], q[j], _mm256_mul_ps(p[j], q[i]));
-    [part(1, 2), part(2, 0), part(0, 1)]
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline]
-fn dot(p: Vectors, q: Vectors) -> __m256 {
-    _mm256_fmadd_ps(p[2], q[2], _mm256_fmadd_ps(p[1], q[1], _mm256_mul_ps(p[0], q[0])))
 }
 
 const NONE: Triangles = Triangles { hit: 0, distance: [0.0; WIDTH], weights: [[0.0; WIDTH]; 3] };

@@ -14,15 +14,12 @@
 //! the interval by 2^-21 covers the relative rounding of the slab test and the 10 roundings of the distance. The
 //! padding is the same for the whole ray and is added to its origin, so it costs nothing.
 //!
-//! **Triangles**, watertight: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013). Corners are
+//! **Triangles**: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013). Corners are
 //! moved into the ray's own sheared space, where the ray is the z axis, and rounded there. The three edge functions
 //! a b - c d are computed by Kahan's method with fused multiply-adds, whose relative error is below 2^-22 (Jeannerod,
 //! Louvet, Muller, "Further analysis of Kahan's algorithm for the accurate computation of 2x2 determinants", 2013).
 //! Their signs are therefore exact unless numbers below 3e-16 m are multiplied, so two triangles that share an edge
 //! agree on which side of it the ray passes, and around a shared corner there is no gap.
-//!
-//! **Triangles**, fast: Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997). Rays may slip
-//! through shared edges.
 #![allow(
     unsafe_code,
     reason = "processor instructions, calls of the system, and a stack that is not cleared for each ray"
@@ -108,7 +105,7 @@ pub(crate) trait Kernel: Copy {
     fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack);
 
     /// Hits at a distance above 0 and at most `limit`. Triangles seen edge-on are not hit.
-    fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles;
+    fn triangles(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles;
 }
 
 /// A sort key. The bits of distances that are not negative sort like the distances; the child's lane takes the last
@@ -153,10 +150,9 @@ impl BoxRay {
     }
 }
 
-/// The values of a ray for the triangle tests.
+/// The values of a ray for the triangle test.
 pub(crate) struct TriangleRay {
     pub(super) origin: [f32; 3],
-    pub(super) direction: [f32; 3],
     /// The axes that become x, y, z of the sheared space; z is the axis along which the direction is largest.
     pub(super) axes: [usize; 3],
     pub(super) shear: [f32; 2],
@@ -175,7 +171,6 @@ impl TriangleRay {
         let distance_from_z = boxes.inverse[z];
         Self {
             origin: ray.origin().to_array(),
-            direction: d,
             axes: [x, y, z],
             shear: [d[x] * distance_from_z, d[y] * distance_from_z],
             distance_from_z,
@@ -227,11 +222,11 @@ impl Kernel for Portable {
         }
     }
 
-    fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
+    fn triangles(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
         let mut found = Triangles { hit: 0, distance: [0.0; WIDTH], weights: [[0.0; WIDTH]; 3] };
         for lane in 0..WIDTH {
             let corners = block.corners.map(|axes| axes.map(|values| values[lane]));
-            let hit = if WATERTIGHT { watertight(&corners, ray) } else { fast(&corners, ray) };
+            let hit = watertight(&corners, ray);
             let Some(hit) = hit.filter(|hit| hit.distance > 0.0 && hit.distance <= limit) else { continue };
             found.hit |= 1 << lane;
             found.distance[lane] = hit.distance;
@@ -263,32 +258,6 @@ fn difference(p: [f32; 3], q: [f32; 3]) -> f32 {
     let product = p[1] * q[0];
     let lost = (-p[1]).mul_add(q[0], product);
     p[0].mul_add(q[1], -product) + lost
-}
-
-fn fast(corners: &[[f32; 3]; 3], ray: &TriangleRay) -> Option<LaneHit> {
-    let minus = |p: [f32; 3], q: [f32; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-    let [first, second] = [minus(corners[1], corners[0]), minus(corners[2], corners[0])];
-    let across = cross(ray.direction, second);
-    let determinant = dot(first, across);
-    let from = minus(ray.origin, corners[0]);
-    let v = dot(from, across);
-    let along = cross(from, first);
-    let w = dot(ray.direction, along);
-    let u = (determinant - v) - w;
-    let (all_above, all_below) = (u >= 0.0 && v >= 0.0 && w >= 0.0, u <= 0.0 && v <= 0.0 && w <= 0.0);
-    if !(all_above || all_below) || determinant == 0.0 {
-        return None;
-    }
-    Some(LaneHit { distance: dot(second, along) / determinant, weights: [u, v, w] })
-}
-
-fn cross(p: [f32; 3], q: [f32; 3]) -> [f32; 3] {
-    let part = |a: f32, b: f32, c: f32, d: f32| a.mul_add(b, -(c * d));
-    [part(p[1], q[2], p[2], q[1]), part(p[2], q[0], p[0], q[2]), part(p[0], q[1], p[1], q[0])]
-}
-
-fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
-    p[2].mul_add(q[2], p[1].mul_add(q[1], p[0] * q[0]))
 }
 
 /// The nodes and blocks that a ray has yet to visit, with the bits of the distance at which the ray enters them. Fixed
