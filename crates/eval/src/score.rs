@@ -1,7 +1,7 @@
 //! Submissions scored on a dataset.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -11,8 +11,7 @@ use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::verdict::{CompareCounts, VerdictFile};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
-use mateval_files::FileError;
-use mateval_files::untrusted::sha256_of_bytes;
+use mateval_files::cache::{Cache, Key};
 use mateval_metrics::Lpips;
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::files::{HashedFile, SubmissionJson, submission_sha256};
@@ -30,6 +29,9 @@ use crate::result::{
     MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
 };
 use crate::scene::{SceneScore, SceneTask, ScoreSheet};
+
+/// The largest entry of the cache that is read, in bytes.
+const MOST_CACHED_BYTES: u64 = 256 << 20;
 
 /// The network of LPIPS, or why it is missing and the command that makes it available.
 pub enum LpipsWeights {
@@ -283,22 +285,25 @@ impl<'a> ScorePlan<'a> {
         })
     }
 
-    /// The cache's file for a scene's scores under a protocol, named after the hash of everything that they depend on.
-    /// None without a cache.
-    fn cache_file(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
+    /// The key of a scene's scores under a protocol: everything that they depend on.
+    fn score_key(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Key {
         let weights = self.lpips.network().map(Lpips::sha256);
         let file = &self.dataset.file;
         let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], weights);
         // A file that cannot be read has no hash, but may replace a map by its default; a finding states it.
         let scored = (&self.tool, print, &prediction.files, &prediction.findings);
-        let key = sha256_of_bytes(json::to_text(&scored).as_bytes());
-        Some(self.cache?.join(format!("{key}.json")))
+        Key::of(json::to_text(&scored).as_bytes())
     }
 
     /// The scores that an earlier run wrote to the cache, if all of them can be read.
     fn read_cached(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
-        // A truncated or foreign file counts as missing.
-        self.protocols.iter().map(|protocol| json::read(&self.cache_file(scene, prediction, protocol)?).ok()).collect()
+        let cache = Cache::new(self.cache?);
+        let read = |protocol: &Protocol| {
+            let key = self.score_key(scene, prediction, protocol);
+            // A truncated or foreign file counts as missing.
+            json::parse(&cache.path(&key), &cache.read(&key, MOST_CACHED_BYTES).ok()??).ok()
+        };
+        self.protocols.iter().map(read).collect()
     }
 
     fn write_cache(
@@ -307,10 +312,9 @@ impl<'a> ScorePlan<'a> {
         prediction: &PredictedScene,
         scores: &[SceneScore],
     ) -> Result<(), EvalError> {
+        let Some(cache) = self.cache.map(Cache::new) else { return Ok(()) };
         for (protocol, score) in self.protocols.iter().zip(scores) {
-            let (Some(folder), Some(path)) = (self.cache, self.cache_file(scene, prediction, protocol)) else { break };
-            std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
-            json::write(&path, score)?;
+            cache.keep(&self.score_key(scene, prediction, protocol), json::to_text(score).as_bytes())?;
         }
         Ok(())
     }
