@@ -22,7 +22,6 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
     Ok(views)
 }
 
-/// A set of views that are rendered together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ViewSet {
     /// The input view, and those that are it turned: they share their paths.

@@ -19,7 +19,6 @@ use crate::result::key::{PictureName, Region, ResultKey, Views};
 pub mod key;
 pub mod means;
 
-/// The word for this version of a result.
 pub const RESULT_FORMAT: &str = "mateval-result/6";
 
 /// A submission's scores on a dataset.

@@ -22,7 +22,6 @@ use crate::result::means::{means, summary_noise};
 use crate::result::{MissingNumbers, RESULT_FORMAT, ResultFile};
 use crate::score::{LpipsWeights, ScorePlan, score};
 
-/// The format name of this version of a verification.
 pub const VERIFICATION_FORMAT: &str = "mateval-verification/1";
 
 /// Whether a result states what its submission scores.

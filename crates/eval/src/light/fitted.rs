@@ -136,7 +136,6 @@ impl LitRoom {
         }
     }
 
-    /// The fit of each prediction of `repaint`.
     fn fit(
         &self,
         paths: &Paths<'_>,

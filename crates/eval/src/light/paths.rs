@@ -17,7 +17,6 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::protocol::LightRules;
 
-/// The four quarters of each view.
 pub(crate) type ViewQuarters = Vec<Vec<Picture<LinearRgb>>>;
 
 /// The four independent renders of a prediction: both quarters of the first half, then of the second.

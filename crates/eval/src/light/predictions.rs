@@ -46,7 +46,6 @@ impl EncodedReference {
 /// Passes a prediction's picture on, with its number.
 pub(crate) type Each<'a> = dyn FnMut(usize, LitPicture<'_>) -> Result<(), EvalError> + 'a;
 
-/// One lighting of the scene's own emitters.
 struct OwnLighting {
     track: Track,
     name: Option<LightingName>,

@@ -159,7 +159,6 @@ fn variance(halves: [&Picture<LinearRgb>; 2], valid: &Mask, exposure: f64) -> f6
     sum / values.max(1) as f64
 }
 
-/// The reference of a scene, as its dataset holds it.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredReference {
     folder: PathBuf,

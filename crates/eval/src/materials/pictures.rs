@@ -80,7 +80,6 @@ fn picture_row(
     rows
 }
 
-/// The mean of the values; 0 without any.
 fn mean_of(all: impl Iterator<Item = Values>) -> Values {
     let (mut sum, mut count) = ([0.0_f64; 5], 0_usize);
     for values in all {
@@ -90,7 +89,6 @@ fn mean_of(all: impl Iterator<Item = Values>) -> Values {
     sum.map(|sum| if count == 0 { 0.0 } else { (sum / count as f64) as f32 })
 }
 
-/// Where a sub-pixel looks a submission up.
 #[derive(Clone, Copy)]
 struct Lookup {
     instance: usize,

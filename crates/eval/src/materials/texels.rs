@@ -139,7 +139,6 @@ fn write_texels(path: &Path, map: &TexelMap, prediction: &Texture, truth: &Textu
     Ok(exr_io::write_channels(path, size, size, names.into_iter().zip(planes).collect(), Precision::Float)?)
 }
 
-/// A texture's value at the place of a texel of row `y`.
 fn value(atlas_size: usize, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
     match (texture.width(), texel.off_centre) {
         (1, _) => texture.texel(0, 0),
