@@ -59,7 +59,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
             let views = render(cameras, samples / 2, &seeds);
             // The scored pictures; their noise is compared under the scene's own radiances.
             let halves = views.iter().flat_map(|view| &view.halves);
-            let scored: Vec<_> = halves.map(|half| half.basis.weighted(&fit.weights).unwrap()).collect();
+            let scored: Vec<_> = halves.map(|half| half.weighted(&fit.weights).unwrap()).collect();
             std::hint::black_box(scored);
             views
         });
