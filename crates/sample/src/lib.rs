@@ -19,16 +19,7 @@ use std::path::Path;
 use mateval_image::png_io::write_rgb_bytes;
 
 pub use house::files::SampleError;
-use house::files::{create_folder, write_text};
-
-/// The text of a scene's licence file, CC0 1.0, after what it is.
-const LICENSE: &str = "
-This scene was released under a CC0 license and is in the public domain.
-It may be copied, modified and used commercially, without permission or
-attribution.
-
-For more information about the license, please see
-https://creativecommons.org/publicdomain/zero/1.0/\n";
+use house::files::{LICENSE, create_folder, write_text};
 
 /// Width and height of the recipe's views, in pixels.
 const RESOLUTION: [u32; 2] = [320, 240];

@@ -330,6 +330,15 @@ pub enum SampleError {
     Image(#[from] mateval_image::ImageError),
 }
 
+/// The text of a scene's licence file, CC0 1.0, after what it is.
+pub(crate) const LICENSE: &str = "
+This scene was released under a CC0 license and is in the public domain.
+It may be copied, modified and used commercially, without permission or
+attribution.
+
+For more information about the license, please see
+https://creativecommons.org/publicdomain/zero/1.0/\n";
+
 pub(crate) fn create_folder(path: &Path) -> Result<(), SampleError> {
     std::fs::create_dir_all(path).map_err(FileError::io("create", path))?;
     Ok(())

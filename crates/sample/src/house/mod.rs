@@ -19,13 +19,11 @@ pub mod models;
 
 use std::path::Path;
 
-use files::{HOUSE_ID, SampleError, create_folder, number, write_text};
+use files::{HOUSE_ID, LICENSE, SampleError, create_folder, number, write_text};
 use layout::House;
 use mateval_dataset::splitmix64;
 use mateval_image::png_io::write_rgb_bytes;
 use serde_json::{Value, json};
-
-use crate::LICENSE;
 
 pub fn built_in() -> House {
     House {
