@@ -128,5 +128,21 @@ fn geometry(corpus: &Path, work: &Path, source: &Path) -> Result<(), Box<dyn std
     keep(corpus, "glb", "rug.glb", &bytes)?;
     keep(corpus, "gltf_scene", "rug.glb", &bytes)?;
     keep(corpus, "gltf_scene", "lit.gltf", LIT.as_bytes())?;
+    // The same with light from outside, as the script that bakes a .blend file hands it back.
+    let exr = work.join("world.exr");
+    write_linear(&exr, &Picture::filled(4, 2, LinearRgb([0.5; 3])), Precision::Half)?;
+    let world = std::fs::read(exr)?;
+    let of = |world: &str| format!(
+        r#"{{"format":"mateval-baked/1","blender":"4.5.15 LTS","glb":"scene.glb","world":{world},"lamps":[{{"node":"a","visible":false}}],"materials":[{{"name":"material 0","base_color":"unstated"}}],"files":[],"findings":[{{"code":"omitted","place":"a","message":"b","action":"c"}}],"faults":[],"error":null}}"#
+    );
+    let map = r#"{"image":"world.exr","world_from_environment":[[1,0,0],[0,0,1],[0,-1,0]]}"#;
+    for (name, result, glb) in [
+        ("constant", of(r#"{"radiance":[0,0,0.5]}"#), &bytes[..]),
+        ("map", of(map), LIT.as_bytes()),
+        ("none", of("null"), LIT.as_bytes()),
+    ] {
+        let lengths = [result.len() as u32, glb.len() as u32].map(u32::to_le_bytes).concat();
+        keep(corpus, "blend_result", name, &[&lengths, result.as_bytes(), glb, &world].concat())?;
+    }
     Ok(())
 }

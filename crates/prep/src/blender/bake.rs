@@ -5,8 +5,13 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::{Finding, Severity, json};
+use mateval_dataset::material::{Material, MaterialModel};
+use mateval_dataset::reference::{Emission, LightGroup, SourceTexture, SurfaceIndex};
+use mateval_dataset::{Finding, Role, SceneLights, Severity, json};
 use mateval_files::FileError;
+use mateval_image::Wrap;
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_sources::source_scene::SourceScene;
 use serde::{Deserialize, Serialize};
 
 use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
@@ -158,15 +163,101 @@ pub fn bake(
     if !result.is_file() {
         return failed(ended.to_string());
     }
-    let baked: Baked = json::read_format(&result, RESULT_FORMAT)?;
+    let baked = Baked::read(&result)?;
     if !baked.faults.is_empty() {
         return Ok(Err(BakeFault::Refused(baked.faults.iter().map(|fault| fault.of_file(&file)).collect())));
     }
     let is_done = matches!(ended, Ended::Itself(status) if status.success());
     match (&baked.error, &baked.glb) {
-        (None, Some(glb)) if is_done && !glb.contains(['/', '\\']) => Ok(Ok((out.join(glb), baked))),
+        (None, Some(glb)) if is_done => Ok(Ok((out.join(glb), baked))),
         (Some(error), _) => failed(error.clone()),
         _ => failed(ended.to_string()),
+    }
+}
+
+impl Baked {
+    /// Reads the script's result, whose files lie beside it. Fails where it is not a result, names a file elsewhere, or
+    /// holds light that no file of Blender can have.
+    pub fn read(path: &Path) -> Result<Self, PrepError> {
+        let baked: Self = json::read_format(path, RESULT_FORMAT)?;
+        let image = match &baked.world {
+            Some(BakedWorld::Map { image, .. }) => Some(image),
+            _ => None,
+        };
+        let is_beside = |name: &&String| !name.contains(['/', '\\', ':']) && !matches!(name.as_str(), "" | "." | "..");
+        let bad = match &baked.world {
+            _ if !baked.glb.iter().chain(image).all(|name| is_beside(&name)) => "the name of a file in its own folder",
+            Some(BakedWorld::Constant { radiance }) if !radiance.iter().all(|v| v.abs() <= MOST_RADIANCE) => {
+                "a radiance of at most 1e9"
+            }
+            Some(BakedWorld::Map { world_from_environment, .. }) if !is_rotation(*world_from_environment) => {
+                "a rotation of the environment"
+            }
+            _ => return Ok(baked),
+        };
+        let wrong = std::io::Error::new(std::io::ErrorKind::InvalidData, format!("expected {bad}"));
+        Err(FileError::io("read", path)(wrong).into())
+    }
+
+    /// Adds to the scene of the GLB, which lies in the folder `out`, what glTF does not have: the light from outside,
+    /// lamps without a body, and which base colours nobody states.
+    pub fn complete(&self, read: &mut SourceScene, out: &Path) -> Result<(), PrepError> {
+        add_world(read, self, out)?;
+        hide_lamps(read, self);
+        let is_unstated = |material: &&BakedMaterial| material.base_color == "unstated";
+        let unstated: Vec<&str> = self.materials.iter().filter(is_unstated).map(|m| m.name.as_str()).collect();
+        for (surface, origin) in read.scene.surfaces.iter().zip(&mut read.origins) {
+            let name = read.scene.materials[surface.material.0].name.as_str();
+            origin.stated.base_color &= !unstated.contains(&name);
+        }
+        Ok(())
+    }
+}
+
+/// Brighter light is a fault.
+const MOST_RADIANCE: f32 = 1e9;
+
+/// Whether the rows are orthonormal, but for rounding.
+fn is_rotation(rows: [[f32; 3]; 3]) -> bool {
+    let product = |a: usize, b: usize| rows[a].iter().zip(rows[b]).map(|(x, y)| x * y).sum::<f32>();
+    let pairs = (0..3).flat_map(|a| (0..3).map(move |b| (a, b)));
+    pairs.into_iter().all(|(a, b)| (product(a, b) - f32::from(u8::from(a == b))).abs() < 1e-3)
+}
+
+/// Replaces the light of a glTF without lights by the file's own light from outside.
+fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), PrepError> {
+    if read.lights == SceneLights::Stage {
+        read.scene.lights.clear();
+        read.findings.retain(|finding| finding.code != "no_light");
+        read.lights = SceneLights::Own;
+    }
+    let emission = match &baked.world {
+        None => return Ok(()),
+        Some(BakedWorld::Constant { radiance }) if radiance.iter().all(|v| *v <= 0.0) => return Ok(()),
+        Some(BakedWorld::Constant { radiance }) => Emission::Constant { radiance: radiance.map(|v| v.max(0.0)) },
+        Some(BakedWorld::Map { image, world_from_environment }) => {
+            let texture = read_texture(&out.join(image), Encoding::Linear, Wrap::Repeat)?;
+            let texture = read.scene.add_texture(SourceTexture::computed("world", texture));
+            Emission::Environment { texture, scale: 1.0, world_from_environment: *world_from_environment }
+        }
+    };
+    read.scene.lights.push(LightGroup { name: "world".to_owned(), emission, camera_visible: true });
+    Ok(())
+}
+
+/// Makes area lamps what they are in Blender: light that has no body.
+fn hide_lamps(read: &mut SourceScene, baked: &Baked) {
+    for lamp in &baked.lamps {
+        let Some(at) = read.scene.surfaces.iter().position(|surface| surface.name == lamp.node) else { continue };
+        read.scene.surfaces[at].material = read.scene.add_material(Material::new("light", MaterialModel::clear()));
+        read.origins[at].role = Role::LightFixture {};
+        let is_its = |light: &&mut LightGroup| match &light.emission {
+            Emission::Area { surfaces, .. } => surfaces.contains(&SurfaceIndex(at)),
+            _ => false,
+        };
+        for light in read.scene.lights.iter_mut().filter(is_its) {
+            light.camera_visible = lamp.visible;
+        }
     }
 }
 
@@ -192,6 +283,30 @@ mod tests {
             [text.replace("baked/1", "baked/9"), text.replace("\"lamps\"", "\"lamp\""), text.replace("0.5]", "0.5")]
         {
             assert!(parse(&bad).is_err());
+        }
+        // Nor are results that name files elsewhere, or light that is none.
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.json");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            Baked::read(&path)
+        };
+        let map = |image: &str, first: &str| {
+            let rows = format!("[[{first}, 0, 0], [0, 0, 1], [0, -1, 0]]");
+            let world = format!(r#"{{"image": "{image}", "world_from_environment": {rows}}}"#);
+            text.replace(r#"{"radiance": [0, 0, 0.5]}"#, &world)
+        };
+        assert!(read(text).is_ok() && read(&map("world.exr", "1")).is_ok());
+        for bad in [
+            text.replace("scene.glb", "../scene.glb"),
+            text.replace("scene.glb", ""),
+            text.replace("0.5]", "1e39]"),
+            map("/etc/world.exr", "1"),
+            map("..", "1"),
+            map("world.exr", "1e30"),
+            map("world.exr", "2"),
+        ] {
+            assert!(read(&bad).is_err(), "{bad}");
         }
     }
 }

@@ -7,13 +7,11 @@ use glam::DVec3;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::dataset::View;
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::material::{Material, MaterialModel, StatedParameters};
-use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene, SourceTexture, SurfaceIndex};
-use mateval_dataset::{Progress, Report, Role, SceneLights, SourceKind, ViewId};
+use mateval_dataset::material::StatedParameters;
+use mateval_dataset::reference::ReferenceScene;
+use mateval_dataset::{Progress, Report, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
-use mateval_image::Wrap;
-use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceScene};
@@ -21,7 +19,7 @@ use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
 use super::fault::{BakeFault, SceneFault};
-use crate::blender::bake::{Baked, BakedWorld, bake};
+use crate::blender::bake::bake;
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
@@ -180,15 +178,7 @@ fn blend_scene(
     let (glb, baked) = baked.map_err(fault)?;
     let mut read = gltf_scene(recipe, entry, &glb, file)?;
     read.kind = SourceKind::Blend;
-    add_world(&mut read, &baked, &out)?;
-    hide_lamps(&mut read, &baked);
-    // What was not stated before it was baked.
-    let unstated: Vec<&str> =
-        baked.materials.iter().filter(|m| m.base_color == "unstated").map(|m| m.name.as_str()).collect();
-    for (surface, origin) in read.scene.surfaces.iter().zip(&mut read.origins) {
-        let name = read.scene.materials[surface.material.0].name.as_str();
-        origin.stated.base_color &= !unstated.contains(&name);
-    }
+    baked.complete(&mut read, &out)?;
     // The files are those of the .blend, not of the glTF.
     read.findings.extend(baked.findings.iter().map(|finding| finding.of_file(&read.file)));
     read.findings.sort();
@@ -201,43 +191,6 @@ fn blend_scene(
     (read.files, read.absent, read.missing) = (files.hashes, files.absent, Missing::default());
     std::fs::remove_dir_all(&out).map_err(FileError::io("remove", &out))?;
     Ok(read)
-}
-
-/// Replaces the light of a glTF without lights by the file's own light from outside.
-fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), PrepError> {
-    if read.lights == SceneLights::Stage {
-        read.scene.lights.clear();
-        read.findings.retain(|finding| finding.code != "no_light");
-        read.lights = SceneLights::Own;
-    }
-    let emission = match &baked.world {
-        None => return Ok(()),
-        Some(BakedWorld::Constant { radiance }) if radiance.iter().all(|v| *v <= 0.0) => return Ok(()),
-        Some(BakedWorld::Constant { radiance }) => Emission::Constant { radiance: radiance.map(|v| v.max(0.0)) },
-        Some(BakedWorld::Map { image, world_from_environment }) => {
-            let texture = read_texture(&out.join(image), Encoding::Linear, Wrap::Repeat)?;
-            let texture = read.scene.add_texture(SourceTexture::computed("world", texture));
-            Emission::Environment { texture, scale: 1.0, world_from_environment: *world_from_environment }
-        }
-    };
-    read.scene.lights.push(LightGroup { name: "world".to_owned(), emission, camera_visible: true });
-    Ok(())
-}
-
-/// Makes area lamps what they are in Blender: light that has no body.
-fn hide_lamps(read: &mut SourceScene, baked: &Baked) {
-    for lamp in &baked.lamps {
-        let Some(at) = read.scene.surfaces.iter().position(|surface| surface.name == lamp.node) else { continue };
-        read.scene.surfaces[at].material = read.scene.add_material(Material::new("light", MaterialModel::clear()));
-        read.origins[at].role = Role::LightFixture {};
-        let is_its = |light: &&mut LightGroup| match &light.emission {
-            Emission::Area { surfaces, .. } => surfaces.contains(&SurfaceIndex(at)),
-            _ => false,
-        };
-        for light in read.scene.lights.iter_mut().filter(is_its) {
-            light.camera_visible = lamp.visible;
-        }
-    }
 }
 
 /// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.
