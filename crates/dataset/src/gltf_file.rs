@@ -5,6 +5,9 @@
 //! Nothing is read outside a buffer. Accessors may be sparse, without a buffer view (all zeros), or quantized
 //! (`KHR_mesh_quantization`).
 
+use std::collections::BTreeMap;
+
+use glam::{DMat4, DVec3};
 use gltf::accessor::DataType;
 use gltf::accessor::sparse::IndexType;
 use gltf::binary::Glb;
@@ -47,6 +50,32 @@ pub struct GltfFile {
     pub stated: Vec<StatedParameters>,
     /// JSON pointers to references to textures without a picture, which were taken out.
     pub without_picture: Vec<String>,
+    /// By node: the translation, as the file states it, of a node that lies far from its parent. The gltf crate rounds it
+    /// to 32 bits, which are too coarse there.
+    far: BTreeMap<usize, [f64; 3]>,
+}
+
+/// A translation longer than this, in metres, is far: there, 32 bits are coarser than 0.06 mm.
+const FAR_M: f64 = 1000.0;
+
+impl GltfFile {
+    /// The transform of a node with its exact translation.
+    pub fn exact(&self, node: &gltf::Node<'_>, rounded: DMat4) -> DMat4 {
+        let exact = self.far.get(&node.index()).map(|translation| DVec3::from_array(*translation).extend(1.0));
+        DMat4 { w_axis: exact.unwrap_or(rounded.w_axis), ..rounded }
+    }
+}
+
+/// The translations of nodes that lie far from their parents.
+fn far_translations(file: &Value) -> BTreeMap<usize, [f64; 3]> {
+    let translation = |node: &Value| -> Option<[f64; 3]> {
+        let from = node.get("matrix").and_then(Value::as_array).and_then(|all| all.get(12..15));
+        let from = from.or_else(|| node.get("translation")?.as_array().map(Vec::as_slice))?;
+        let numbers: Vec<f64> = from.iter().filter_map(Value::as_f64).collect();
+        <[f64; 3]>::try_from(numbers).ok().filter(|found| DVec3::from_array(*found).length() > FAR_M)
+    };
+    let nodes = list(file, "nodes").iter().enumerate();
+    nodes.filter_map(|(at, node)| Some((at, translation(node)?))).collect()
 }
 
 /// The JSON of a file: the first chunk of a GLB as far as the file reaches, or else the whole file.
@@ -70,9 +99,10 @@ pub fn parse(bytes: &[u8]) -> Result<GltfFile, GltfError> {
     require_others_only(&mut file);
     let without_picture = take_textures_without_picture(&mut file)?;
     let stated = list(&file, "materials").iter().map(stated_parameters).collect();
+    let far = far_translations(&file);
     let root: gltf::json::Root = serde_json::from_value(file).map_err(GltfError::not_valid)?;
     let document = checked(root)?;
-    Ok(GltfFile { document, blob, stated, without_picture })
+    Ok(GltfFile { document, blob, stated, without_picture, far })
 }
 
 fn chunks(bytes: &[u8]) -> Result<(Vec<u8>, Option<Vec<u8>>), GltfError> {
@@ -80,6 +110,10 @@ fn chunks(bytes: &[u8]) -> Result<(Vec<u8>, Option<Vec<u8>>), GltfError> {
     let stated = bytes.get(8..12).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     if let Some(length) = stated.filter(|length| *length < GLB_HEADER) {
         let what = format!("a binary file that states a length of {length} bytes; its header alone has {GLB_HEADER}");
+        return Err(GltfError::not_valid(what));
+    }
+    if let Some(stated) = stated.filter(|length| *length as usize > bytes.len()) {
+        let what = format!("a binary file that states a length of {stated} bytes and has {}", bytes.len());
         return Err(GltfError::not_valid(what));
     }
     let glb = Glb::from_slice(bytes).map_err(GltfError::not_valid)?;
@@ -117,16 +151,22 @@ fn require_others_only(file: &mut Value) {
 }
 
 /// Takes out the references to textures without a picture. Returns their JSON pointers. Fails where the picture exists
-/// as KTX2 alone: without it, the material would be another.
+/// in the format of an extension alone, as KTX2: without it, the material would be another.
 fn take_textures_without_picture(file: &mut Value) -> Result<Vec<String>, GltfError> {
     let textures = list(file, "textures");
     let absent: Vec<bool> = textures.iter().map(|texture| texture.get("source").is_none()).collect();
-    let is_ktx2 = |texture: &Value| texture.pointer(&format!("/extensions/{KTX2}")).is_some();
-    let only_ktx2 = textures.iter().position(|texture| texture.get("source").is_none() && is_ktx2(texture));
-    if let Some(texture) = only_ktx2 {
-        let way_out = "convert the file with `gltf-transform ktxdecompress`";
-        let what = format!("its only picture is KTX2 ({KTX2}), which is not read; {way_out}");
-        return Err(GltfError(format!("/textures/{texture}: {what}")));
+    for (at, texture) in textures.iter().enumerate().filter(|(_, texture)| texture.get("source").is_none()) {
+        let extensions = texture.get("extensions").and_then(Value::as_object).into_iter().flatten();
+        let with_picture = extensions.filter(|(_, extension)| extension.get("source").is_some());
+        let Some(name) = with_picture.map(|(name, _)| name.as_str()).next() else { continue };
+        let what = if name == KTX2 {
+            let way_out = "convert the file with `gltf-transform ktxdecompress`";
+            format!("its only picture is KTX2 ({KTX2}), which is not read; {way_out}")
+        } else {
+            let name = shortened(name);
+            format!("its only picture is that of the extension '{name}', which is not read; convert the pictures to PNG")
+        };
+        return Err(GltfError(format!("/textures/{at}: {what}")));
     }
     let mut pointers = Vec::new();
     if !absent.contains(&true) {
@@ -399,7 +439,20 @@ mod tests {
             let bytes = [&b"glTF"[..], &2_u32.to_le_bytes(), &length.to_le_bytes(), &[0; 8]].concat();
             let found = parse(&bytes).unwrap_err();
             assert_eq!(found.to_string().contains("its header alone has 12"), length < 12, "{found}");
+            assert_eq!(found.to_string().contains("and has 20"), length == u32::MAX, "{found}");
         }
+    }
+
+    #[test]
+    fn far_translations_keep_their_digits() {
+        let matrix = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -354123.495, 1]);
+        let file = parsed(json!({ "nodes": [
+            { "translation": [448231.137, 0, 0.1] }, { "matrix": matrix }, { "translation": [0.1, 0, 999] }, {},
+        ] }));
+        let file = file.unwrap();
+        let found = file.document.nodes().map(|node| file.exact(&node, DMat4::IDENTITY).w_axis.truncate());
+        let far = [DVec3::new(448231.137, 0.0, 0.1), DVec3::new(0.0, 0.0, -354123.495)];
+        assert_eq!(found.collect::<Vec<_>>(), [far[0], far[1], DVec3::ZERO, DVec3::ZERO]);
     }
 
     /// The gltf crate panics where these are looked up.
@@ -451,8 +504,12 @@ mod tests {
         assert_eq!(file.without_picture, ["/materials/0/pbrMetallicRoughness/baseColorTexture"]);
         assert!(file.document.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().is_none());
         assert!(!file.stated[0].base_color);
-        let error = with(json!({ "extensions": { KTX2: { "source": 0 } } })).unwrap_err().to_string();
-        assert!(error.contains(KTX2) && error.starts_with("/textures/0: "), "{error}");
+        for extension in [KTX2, "EXT_texture_avif", "MSFT_texture_dds"] {
+            let error = with(json!({ "extensions": { extension: { "source": 0 } } })).unwrap_err().to_string();
+            assert!(error.contains(extension) && error.starts_with("/textures/0: "), "{error}");
+        }
+        // Twin: an extension that holds no picture.
+        assert!(with(json!({ "extensions": { "EXT_other": {} } })).is_ok());
     }
 
     #[test]

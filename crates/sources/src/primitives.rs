@@ -51,20 +51,29 @@ pub(crate) fn rectangle() -> TriangleMesh {
     build.finish()
 }
 
-/// The cube [-1, 1]^3, whose faces each cover the whole uv square.
+/// The cube [-1, 1]^3, whose faces each cover the whole uv square, turned as in Mitsuba 3.9.1.
 pub(crate) fn cube() -> TriangleMesh {
+    /// The directions in which Mitsuba's u and v grow on the faces +x, -x, +y, -y, +z and -z.
+    const GROWING: [[DVec3; 2]; 6] = [
+        [DVec3::Y, DVec3::NEG_Z],
+        [DVec3::Y, DVec3::Z],
+        [DVec3::NEG_X, DVec3::NEG_Z],
+        [DVec3::Z, DVec3::X],
+        [DVec3::Y, DVec3::X],
+        [DVec3::NEG_Y, DVec3::X],
+    ];
     let mut build = Builder::default();
-    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        for normal in [axis, -axis] {
-            let right = DVec3::new(axis.y.abs() + axis.z.abs(), axis.x.abs(), 0.0).normalize();
-            let right = if axis == DVec3::X { DVec3::Z } else { right.with_y(0.0).normalize() };
-            let up = normal.cross(right);
-            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-            let ids = corners.map(|(x, y)| {
-                build.vertex(normal + right * x + up * y, normal, DVec2::new((x + 1.0) / 2.0, (y + 1.0) / 2.0))
-            });
-            build.quad(ids);
-        }
+    let normals = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+    for (normal, growing) in normals.zip(GROWING) {
+        let right = if normal.x == 0.0 { DVec3::X } else { DVec3::Z };
+        let up = normal.cross(right);
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let ids = corners.map(|(x, y)| {
+            let position = normal + right * x + up * y;
+            let [u, v] = growing.map(|direction| (1.0 + position.dot(direction)) / 2.0);
+            build.vertex(position, normal, DVec2::new(u, v))
+        });
+        build.quad(ids);
     }
     build.finish()
 }
@@ -222,6 +231,33 @@ mod tests {
                 let front = (b - a).cross(c - a).normalize();
                 assert!(triangle.iter().all(|&v| front.dot(normals[v as usize]) > 0.9));
             }
+        }
+    }
+
+    /// The texture coordinates of Mitsuba 3.9.1's `cube` at corners of each face; two corners and the winding determine
+    /// those of the others.
+    #[test]
+    fn cube_uv() {
+        let mesh = cube();
+        let (normals, uvs) = (mesh.normals.unwrap(), mesh.uvs.unwrap());
+        for (normal, position, uv) in [
+            (Vec3::NEG_Y, [1.0, -1.0, -1.0], [0.0, 1.0]),
+            (Vec3::NEG_Y, [-1.0, -1.0, 1.0], [1.0, 0.0]),
+            (Vec3::NEG_Y, [1.0, -1.0, 1.0], [1.0, 1.0]),
+            (Vec3::Y, [1.0, 1.0, -1.0], [0.0, 1.0]),
+            (Vec3::Y, [1.0, 1.0, 1.0], [0.0, 0.0]),
+            (Vec3::X, [1.0, -1.0, -1.0], [0.0, 1.0]),
+            (Vec3::X, [1.0, 1.0, 1.0], [1.0, 0.0]),
+            (Vec3::Z, [1.0, -1.0, 1.0], [0.0, 1.0]),
+            (Vec3::Z, [-1.0, 1.0, 1.0], [1.0, 0.0]),
+            (Vec3::NEG_X, [-1.0, -1.0, 1.0], [0.0, 1.0]),
+            (Vec3::NEG_X, [-1.0, 1.0, -1.0], [1.0, 0.0]),
+            (Vec3::NEG_Z, [1.0, 1.0, -1.0], [0.0, 1.0]),
+            (Vec3::NEG_Z, [-1.0, -1.0, -1.0], [1.0, 0.0]),
+        ] {
+            let is_it = |at: &usize| mesh.positions[*at] == Vec3::from(position) && normals[*at] == normal;
+            let at = (0..uvs.len()).find(is_it).unwrap();
+            assert_eq!(uvs[at], Vec2::new(uv[0], 1.0 - uv[1]), "{normal} {position:?}");
         }
     }
 

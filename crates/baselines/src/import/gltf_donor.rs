@@ -53,7 +53,7 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
         roughness: None,
         metallic: None,
     });
-    reader.walk(&file.document, shift, &mut donor)?;
+    reader.walk(&file, shift, &mut donor)?;
     donor.use_means();
     donor.check_base_color()?;
     Ok(donor)
@@ -202,8 +202,9 @@ impl Reader<'_> {
         Ok(read)
     }
 
-    fn walk(&self, file: &gltf::Document, shift: DVec3, donor: &mut Donor) -> Result<(), ImportError> {
-        let scene = file.default_scene().or_else(|| file.scenes().next());
+    fn walk(&self, file: &GltfFile, shift: DVec3, donor: &mut Donor) -> Result<(), ImportError> {
+        let document = &file.document;
+        let scene = document.default_scene().or_else(|| document.scenes().next());
         let scene = scene.ok_or_else(|| invalid("the file has no scene"))?;
         let mut visited = BTreeSet::new();
         let mut open: Vec<(gltf::Node<'_>, DMat4, Vec<String>)> =
@@ -219,8 +220,8 @@ impl Reader<'_> {
             if above.len() >= MAX_DEPTH {
                 return Err(invalid(format!("node {} is nested more than {MAX_DEPTH} deep", node.index())));
             }
-            let world_from_node =
-                world_from_parent * DMat4::from_cols_array_2d(&node.transform().matrix().map(|c| c.map(f64::from)));
+            let rounded = DMat4::from_cols_array_2d(&node.transform().matrix().map(|column| column.map(f64::from)));
+            let world_from_node = world_from_parent * file.exact(&node, rounded);
             let own = node.name().unwrap_or_default().to_owned();
             let names: Vec<String> = std::iter::once(own).chain(above).collect();
             let first = donor.triangles.len();

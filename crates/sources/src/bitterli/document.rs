@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use mateval_files::source_folder::SourceFolder;
+use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_files::untrusted::{hint, shortened, without_mark};
 
 use crate::log::Log;
@@ -120,6 +120,7 @@ impl Document {
             depth_limit: limits.xml_depth,
             serial: 0,
             files: Vec::new(),
+            search: Vec::new(),
             folder,
             log,
         };
@@ -204,6 +205,8 @@ struct Builder<'l> {
     serial: usize,
     /// The included file that is being read, and its includers; empty in the scene's own.
     files: Vec<String>,
+    /// The folders of the `<path>` elements so far.
+    search: Vec<String>,
     folder: &'l mut SourceFolder,
     log: &'l mut Log,
 }
@@ -234,7 +237,11 @@ impl Builder<'_> {
             match child.tag.as_str() {
                 "default" => self.define(&child),
                 "include" => element.children.extend(self.included(&child, depth + 1)?),
-                _ => element.children.push(child),
+                _ => {
+                    let folder = child.attribute("value").filter(|_| child.tag == "path");
+                    self.search.extend(folder.map(str::to_owned));
+                    element.children.push(child);
+                }
             }
         }
         Ok(element)
@@ -245,8 +252,8 @@ impl Builder<'_> {
     fn included(&mut self, include: &Element, depth: usize) -> Result<Vec<Element>, Invalid> {
         let line = include.line;
         let refused = |reason| Invalid(format!("line {line}: <include>: {reason}"));
-        let name = include.attribute("filename").unwrap_or("");
-        let file = SourceFolder::relative(name).map_err(|fault| refused(fault.message))?;
+        let file = self.include_path(include.attribute("filename").unwrap_or(""));
+        let file = file.map_err(|fault| refused(fault.message))?;
         if self.files.contains(&file) || self.files.len() >= MOST_INCLUDES {
             return Err(refused(format!("'{}' includes itself, or is included too deeply", shortened(&file))));
         }
@@ -265,6 +272,16 @@ impl Builder<'_> {
         let root = root?;
         // A file that holds one object includes that object.
         Ok(if root.tag == "scene" { root.children } else { vec![root] })
+    }
+
+    /// The path of an included file: as in Mitsuba beside the including file, else in the scene's own folder, else in
+    /// the last `<path>` before it.
+    fn include_path(&self, name: &str) -> Result<String, FileFault> {
+        let own = SourceFolder::relative(name)?;
+        let beside = self.files.last().and_then(|file| file.rsplit_once('/')).map_or("", |(folder, _)| folder);
+        let folders = [beside, ""].into_iter().chain(self.search.iter().rev().map(String::as_str));
+        let mut found = folders.filter_map(|folder| SourceFolder::relative(&format!("./{folder}/{own}")).ok());
+        Ok(found.find(|file| self.folder.contains(file)).unwrap_or(own))
     }
 
     fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), Invalid> {

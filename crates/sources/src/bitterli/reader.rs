@@ -57,11 +57,12 @@ impl<'a> Reader<'a> {
         Parameters::new(element, place, &self.ids, &mut self.log)
     }
 
-    /// The file `name` relative to the scene's folder: there, or else in the first folder of `<path>` that has it.
+    /// The file `name` relative to the scene's folder. As in Mitsuba, the last `<path>` that has it counts, and the
+    /// scene's own folder comes after all of them.
     pub(super) fn file(&self, name: &str) -> Result<String, FileFault> {
         let own = SourceFolder::relative(name)?;
-        let folders = self.search.iter().filter(|_| !self.source.contains(&own));
-        let mut found = folders.filter_map(|folder| SourceFolder::relative(&format!("{folder}/{own}")).ok());
+        let below = |folder: &String| SourceFolder::relative(&format!("{folder}/{own}")).ok();
+        let mut found = self.search.iter().rev().filter_map(below);
         Ok(found.find(|file| self.source.contains(file)).unwrap_or(own))
     }
 

@@ -91,6 +91,10 @@ impl<'a> Reader<'a> {
         let axis = from.string("fov_axis").unwrap_or("x");
         let focal_length = from.string("focal_length");
         let fov = from.number_within("fov", 1e-3, 179.9, &mut self.log);
+        if fov.is_some() && focal_length.is_some() {
+            let message = format!("line {line}: the sensor states both fov and focal_length, which Mitsuba refuses");
+            self.log.warn("bad_value", &from.place, message, "used fov");
+        }
         let (half_tangent, axis) = match fov {
             Some(degrees) => (libm::tan(degrees.to_radians() / 2.0), axis),
             None => {
@@ -242,6 +246,14 @@ mod tests {
         assert_eq!(findings, ["no_field_of_view"]);
         let four_to_three = "<scene version='3.0.0'><sensor type='perspective'/></scene>";
         assert!((fov_x_degrees(&read_xml(four_to_three).unwrap().camera.unwrap()) - 38.18).abs() < 5e-3);
+    }
+
+    #[test]
+    fn two_statements_of_the_field_of_view_are_a_finding() {
+        let both = "<float name='fov' value='60'/><string name='focal_length' value='35mm'/>";
+        let (camera, findings) = sensor_camera(both, "");
+        assert!((fov_x_degrees(&camera) - 60.0).abs() < 1e-4);
+        assert_eq!(findings, ["bad_value"]);
     }
 
     #[test]

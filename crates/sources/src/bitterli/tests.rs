@@ -99,6 +99,43 @@ fn included_files_stand_in_their_place_and_paths_are_searched() {
     }
 }
 
+/// Mitsuba 3.9.1 takes files of the last `<path>` first, but an included file beside the one that includes it, else
+/// beside the scene, else of a `<path>` before it.
+#[test]
+fn folders_are_searched_in_mitsubas_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    };
+    let read_with = |text: &str| {
+        write("scene.xml", &format!("<scene version='3.0.0'>{text}{SENSOR}</scene>"));
+        read(&folder.path().join("scene.xml"), None, &Limits::default()).unwrap()
+    };
+    let at = |z: f64| format!("v 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nf 1 2 3\n");
+    [("t.obj", 1.0), ("a/t.obj", 2.0), ("b/t.obj", 3.0)].map(|(name, z)| write(name, &at(z)));
+    let shape = "<shape type='obj'><string name='filename' value='t.obj'/></shape>";
+    let found = |paths: &str| read_with(&format!("{paths}{shape}")).scene.surfaces[0].mesh.positions[0].z;
+    assert_eq!(found(""), 1.0);
+    assert_eq!(found("<path value='a'/>"), 2.0);
+    assert_eq!(found("<path value='a'/><path value='b'/>"), 3.0);
+    assert_eq!(found("<path value='b'/><path value='a'/><path value='gone'/>"), 2.0);
+
+    let of = |name: &str| format!("<scene version='3.0.0'><shape type='rectangle' id='{name}'/></scene>");
+    let including = "<scene version='3.0.0'><include filename='more.xml'/></scene>";
+    write("in/first.xml", including);
+    write("a/more.xml", &of("path"));
+    let found = |text: &str| read_with(text).scene.surfaces[0].name.clone();
+    let include = "<include filename='in/first.xml'/>";
+    assert_eq!(found(&format!("<path value='a'/>{include}")), "path");
+    write("more.xml", &of("own"));
+    assert_eq!(found(include), "own");
+    assert_eq!(found(&format!("<path value='a'/>{include}")), "own");
+    write("in/more.xml", &of("beside"));
+    assert_eq!(found(&format!("<path value='a'/>{include}")), "beside");
+}
+
 /// The same room at the origin and 571 km from it.
 #[test]
 fn far_scenes_are_moved_by_whole_metres() {

@@ -53,7 +53,7 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileS
     let document = &file.document;
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let scene = scene.ok_or_else(|| invalid(Invalid::new("/scenes: expected a scene, found none")))?;
-    let shift_m = shift_of(camera.or_else(|| nodes::place_of_camera(&scene)).unwrap_or(DVec3::ZERO));
+    let shift_m = shift_of(camera.or_else(|| nodes::place_of_camera(&file, &scene)).unwrap_or(DVec3::ZERO));
     report_shift(shift_m, &mut log);
     let mut reader = Reader {
         file: &file,

@@ -9,7 +9,7 @@ use gltf::mesh::Mode;
 use gltf::scene::Transform;
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::camera::{Camera, Intrinsics};
-use mateval_dataset::gltf_file::{GltfError, INSTANCING, indices, numbers};
+use mateval_dataset::gltf_file::{GltfError, GltfFile, INSTANCING, first_numbers, indices, numbers};
 use mateval_dataset::reference::{Emission, Surface, SurfaceIndex};
 use mateval_files::source_folder::FileFault;
 use mateval_files::untrusted::shortened;
@@ -45,6 +45,8 @@ struct Group {
     mesh: TriangleMesh,
     /// For each triangle, the place of its primitive in the mesh of the file.
     labels: Vec<usize>,
+    /// Whether colours of vertices, which are left out, change its base colour.
+    is_painted: bool,
 }
 
 impl Group {
@@ -66,10 +68,19 @@ impl Group {
 impl Reader<'_> {
     /// Adds all nodes of a scene, moved by `-shift`. Returns its first perspective camera, in the order of the tree.
     pub(super) fn nodes(&mut self, scene: &gltf::Scene<'_>, shift: DVec3) -> Option<Camera> {
-        let (placed, repeated) = placed_nodes(scene, shift);
-        for index in repeated {
-            let message = "the node is the child of two nodes, or of itself";
-            self.log.warn("not_a_tree", &format!("/nodes/{index}"), message, "kept its first place");
+        let (placed, faults) = placed_nodes(self.file, scene, shift);
+        for (index, fault) in faults {
+            let place = format!("/nodes/{index}");
+            match fault {
+                NodeFault::Repeated => {
+                    let message = "the node is the child of two nodes, or of itself";
+                    self.log.warn("not_a_tree", &place, message, "kept its first place");
+                }
+                NodeFault::Projection(row) => {
+                    let message = format!("expected a matrix whose last row is 0 0 0 1, found {row:?}");
+                    self.log.warn("bad_transform", &place, message, "left the node and its children out");
+                }
+            }
         }
         let mut camera = None;
         for PlacedNode { node, world_from_node, is_sound } in placed {
@@ -189,10 +200,11 @@ impl Reader<'_> {
                     let at = at.unwrap_or_else(|| {
                         let name = self.scene.materials[read.index.0].name.clone();
                         let (mesh, labels) = (TriangleMesh::default(), Vec::new());
-                        groups.push(Group { material: material.index(), read, name, mesh, labels });
+                        groups.push(Group { material: material.index(), read, name, mesh, labels, is_painted: false });
                         groups.len() - 1
                     });
                     groups[at].add(&mesh, primitive.index());
+                    groups[at].is_painted |= self.is_painted(&primitive);
                 }
                 Err(fault) => self.log.warn(fault.code, &pointer, fault.message, "left the primitive out"),
             }
@@ -220,7 +232,18 @@ impl Reader<'_> {
             self.add_light(&name, emission, true, pointer);
         }
         self.scene.surfaces.push(Surface { name, mesh, material: group.read.index });
-        self.origins.push(InstanceOrigin { part_of_triangle, stated: group.read.stated, ..InstanceOrigin::default() });
+        let mut stated = group.read.stated;
+        stated.base_color &= !group.is_painted;
+        self.origins.push(InstanceOrigin { part_of_triangle, stated, ..InstanceOrigin::default() });
+    }
+
+    /// Whether the vertices of a primitive have other colours than white, which multiply the base colour.
+    fn is_painted(&self, primitive: &gltf::Primitive<'_>) -> bool {
+        let vertices = primitive.get(&Semantic::Positions).map_or(0, |positions| positions.count());
+        // More colours than vertices, which were counted, belong to no vertex.
+        let colors = primitive.get(&Semantic::Colors(0)).filter(|colors| colors.count() <= vertices);
+        let colors = colors.and_then(|colors| first_numbers::<3>(&colors, self.buffers).ok());
+        colors.is_some_and(|colors| colors.iter().any(|rgb| *rgb != [1.0; 3]))
     }
 
     /// The triangles of a primitive, with the texture coordinates of one set. Counts them before they are read.
@@ -302,15 +325,25 @@ impl Reader<'_> {
     }
 }
 
-/// The node's own transform, and whether its rotation could be normalised; without, it has none.
-fn parent_from_node(node: &gltf::Node<'_>) -> (DMat4, bool) {
-    let (translation, rotation, scale) = match node.transform() {
+/// The largest deviation from the last row of an affine matrix that counts as noise.
+const AFFINE_TOLERANCE: f64 = 1e-6;
+
+/// The node's own transform, and whether its rotation could be normalised; without, it has none. Fails with the last row
+/// of a matrix that is a projection.
+fn parent_from_node(file: &GltfFile, node: &gltf::Node<'_>) -> Result<(DMat4, bool), [f64; 4]> {
+    let (transform, is_sound) = match node.transform() {
         Transform::Matrix { matrix } => {
-            return (DMat4::from_cols_array_2d(&matrix.map(|column| column.map(f64::from))), true);
+            let mut columns = matrix.map(|column| column.map(f64::from));
+            let row = columns.map(|column| column[3]);
+            if row.iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(found, wanted)| (found - wanted).abs() > AFFINE_TOLERANCE) {
+                return Err(row);
+            }
+            columns.iter_mut().zip([0.0, 0.0, 0.0, 1.0]).for_each(|(column, exact)| column[3] = exact);
+            (DMat4::from_cols_array_2d(&columns), true)
         }
-        Transform::Decomposed { translation, rotation, scale } => (translation, rotation, scale),
+        Transform::Decomposed { translation, rotation, scale } => placed(translation, rotation, scale),
     };
-    placed(translation, rotation, scale)
+    Ok((file.exact(node, transform), is_sound))
 }
 
 /// The transform of a translation, a quaternion and a scale, and whether the quaternion could be normalised.
@@ -329,31 +362,48 @@ struct PlacedNode<'f> {
     is_sound: bool,
 }
 
-/// The nodes of a scene in the order of the tree, moved by `-shift`, and the indices of those that are reached again: a
-/// node has one parent, so these may be part of a circle.
-fn placed_nodes<'f>(scene: &gltf::Scene<'f>, shift: DVec3) -> (Vec<PlacedNode<'f>>, Vec<usize>) {
-    let (mut placed, mut repeated, mut visited) = (Vec::new(), Vec::new(), BTreeSet::new());
+/// Why a node is left out.
+enum NodeFault {
+    /// It is reached again: a node has one parent, so it may be part of a circle.
+    Repeated,
+    /// Its matrix is a projection, with this last row.
+    Projection([f64; 4]),
+}
+
+/// The nodes of a scene in the order of the tree, moved by `-shift`, and the indices of those that are left out.
+fn placed_nodes<'f>(
+    file: &GltfFile,
+    scene: &gltf::Scene<'f>,
+    shift: DVec3,
+) -> (Vec<PlacedNode<'f>>, Vec<(usize, NodeFault)>) {
+    let (mut placed, mut faults, mut visited) = (Vec::new(), Vec::new(), BTreeSet::new());
     let root = shift_transform(shift);
     let mut open: Vec<(gltf::Node<'f>, DMat4)> = scene.nodes().map(|node| (node, root)).collect();
     open.reverse();
     while let Some((node, world_from_parent)) = open.pop() {
         if !visited.insert(node.index()) {
-            repeated.push(node.index());
+            faults.push((node.index(), NodeFault::Repeated));
             continue;
         }
-        let (parent_from_node, is_sound) = parent_from_node(&node);
+        let (parent_from_node, is_sound) = match parent_from_node(file, &node) {
+            Ok(found) => found,
+            Err(row) => {
+                faults.push((node.index(), NodeFault::Projection(row)));
+                continue;
+            }
+        };
         let world_from_node = world_from_parent * parent_from_node;
         let first = open.len();
         open.extend(node.children().map(|child| (child, world_from_node)));
         open[first..].reverse();
         placed.push(PlacedNode { node, world_from_node, is_sound });
     }
-    (placed, repeated)
+    (placed, faults)
 }
 
 /// The place of the scene's first camera that can be used, as [`Reader::nodes`] finds it.
-pub(super) fn place_of_camera(scene: &gltf::Scene<'_>) -> Option<DVec3> {
-    let (placed, _) = placed_nodes(scene, DVec3::ZERO);
+pub(super) fn place_of_camera(file: &GltfFile, scene: &gltf::Scene<'_>) -> Option<DVec3> {
+    let (placed, _) = placed_nodes(file, scene, DVec3::ZERO);
     placed.iter().find_map(|placed| Some(perspective(&placed.node.camera()?, placed.world_from_node)?.position()))
 }
 
