@@ -32,7 +32,12 @@ const BUILT_IN: [(&str, &str); 13] = [
 ];
 
 /// The endings of files that may hold a map.
-const PICTURES: [&str; 9] = ["png", "jpg", "jpeg", "webp", "exr", "hdr", "npy", "tif", "tiff"];
+const PICTURES: [&str; 18] = [
+    "png", "jpg", "jpeg", "webp", "exr", "hdr", "npy", "tif", "tiff", "bmp", "gif", "tga", "npz", "pfm", "mat", "pt",
+    "pth", "pkl",
+];
+/// The deepest folder, below that of the estimates, in which such files are looked for.
+const DEEPEST: usize = 4;
 
 /// The pictures of a method.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -123,8 +128,7 @@ impl Adapter {
         words.collect::<Vec<_>>().join(", ")
     }
 
-    /// Pictures and arrays that the adapter does not read: those in `folder`, in the folders of the scenes, and in the
-    /// folders directly below these; sorted.
+    /// Pictures and arrays that the adapter does not read: those in `folder` and in the folders below it; sorted.
     pub fn unread(&self, folder: &Path, scenes: &[&str]) -> Vec<String> {
         let read: BTreeSet<PathBuf> = self
             .maps()
@@ -132,16 +136,19 @@ impl Adapter {
                 scenes.iter().filter_map(|scene| file.path(folder, scene).ok()).collect::<Vec<_>>()
             })
             .collect();
-        let beside = scenes.iter().map(|scene| folder.join(scene)).chain([folder.to_owned()]);
         let is_hidden = |path: &Path| path.file_name().is_some_and(|name| name.as_encoded_bytes()[0] == b'.');
         let entries = |folder: &Path| {
             let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
             entries.map(|entry| entry.path()).filter(|path| !is_hidden(path)).collect::<Vec<_>>()
         };
-        let mut folders = BTreeSet::new();
-        for beside in beside {
-            folders.extend(entries(&beside).into_iter().filter(|path| path.is_dir()));
-            folders.insert(beside);
+        let (mut folders, mut at) = (vec![folder.to_owned()], 0);
+        while at < folders.len() {
+            if folders[at].strip_prefix(folder).is_ok_and(|below| below.components().count() < DEEPEST) {
+                // Links are not followed, since they may lead back.
+                let is_folder = |path: &PathBuf| path.is_dir() && !path.is_symlink();
+                folders.extend(entries(&folders[at]).into_iter().filter(is_folder));
+            }
+            at += 1;
         }
         let is_picture = |path: &PathBuf| {
             let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_lowercase();
@@ -159,7 +166,7 @@ impl Adapter {
     pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
         let mut estimate = Estimate { placement: Some(self.placement), ..Estimate::default() };
         for (map, file, channel) in self.maps() {
-            let Some(picture) = file.read(folder, scene, channel)? else { continue };
+            let Some(picture) = file.read(folder, scene, map, channel)? else { continue };
             let scalar = || picture.map(|LinearRgb(rgb)| rgb[0]);
             match map {
                 Map::BaseColor => estimate.base_color = Some(picture),
@@ -183,6 +190,11 @@ const MOST_BRIGHT: f64 = 0.01;
 const LARGEST_WORD: f32 = 65535.0;
 /// 16-bit integers that end between these numbers are bytes that were saved as words.
 const LARGEST_BYTE: std::ops::RangeInclusive<f32> = 128.0..=255.0;
+
+/// A map of base colour or roughness whose largest stored number is above 0 and below this has another range than the
+/// adapter states: numbers of 0 to 255 that were divided twice, or 0 and 1 as bytes. Networks put noise of this size into
+/// metallic maps.
+const LEAST_LARGEST: f32 = 1.5 / 255.0;
 
 /// Numbers below this, in the adapter's range, are more than the noise of a network.
 const LEAST: f32 = -0.1;
@@ -240,16 +252,26 @@ pub(crate) struct Stored {
 }
 
 impl AdaptedFile {
-    /// The linear picture; `channel` selects a scalar, which is repeated in all three channels. Absent if an optional
-    /// file is missing.
+    /// The linear picture of `map`; `channel` selects a scalar, which is repeated in all three channels. Absent if an
+    /// optional file is missing.
     pub(crate) fn read(
         &self,
         folder: &Path,
         scene: &str,
+        map: Map,
         channel: Option<Channel>,
     ) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
         let Some(Stored { path, numbers }) = self.stored(folder, scene, channel)? else { return Ok(None) };
         let refused = |why: String| Err(BaselineError::unusable(&path, why));
+        let largest = numbers.pixels().iter().flatten().copied().fold(f32::NEG_INFINITY, f32::max);
+        if map != Map::Metallic && self.scale == Scale::Absolute && 0.0 < largest && largest < LEAST_LARGEST {
+            let [low, high] = self.range;
+            let high = low + largest * (high - low);
+            return refused(format!(
+                "holds no number above {largest}, in the adapter's `range`; expected 0 to 1; if {high} stands for 1, write \
+                 range = [{low:.1}, {high}] below the map in the adapter"
+            ));
+        }
         let below = numbers.pixels().iter().filter(|rgb| rgb.iter().any(|value| *value < LEAST)).count();
         if below as f64 > MOST_BELOW * numbers.pixels().len() as f64 {
             let value = numbers.pixels().iter().flatten().copied().filter(|v| v.is_finite()).fold(0.0, f32::min);
@@ -435,7 +457,7 @@ mod tests {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         let adapter = Adapter::find("marigold").unwrap();
-        let unread = ["other/albedo.tiff", "s/rgb_normals.png", "s/run/albedo.tif"];
+        let unread = ["other/albedo.tiff", "s/rgb_normals.png", "s/run/albedo.tif", "s/run/deep/albedo.png"];
         assert_eq!(adapter.unread(folder.path(), &["s"]), unread);
         assert_eq!(
             adapter.inventory(folder.path(), &["s"]),
@@ -467,7 +489,27 @@ mod tests {
     /// The picture in the folder's file of this name, whose adapter has these further lines.
     fn read(folder: &Path, file: &str, lines: &str) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
         let text = format!("files = [\"{file}\"]\nencoding = \"linear\"\n{lines}");
-        toml::from_str::<AdaptedFile>(&text).unwrap().read(folder, "s", None)
+        toml::from_str::<AdaptedFile>(&text).unwrap().read(folder, "s", Map::BaseColor, None)
+    }
+
+    #[test]
+    fn pictures_of_nearly_nothing_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |largest: u8| {
+            let bytes = image::ImageBuffer::from_fn(16, 16, |x, _| image::Luma([if x < 9 { largest } else { 0 }]));
+            bytes.save(folder.path().join("a.png")).unwrap();
+        };
+        write(1);
+        let refused = read(folder.path(), "a.png", "").unwrap_err().to_string();
+        assert!(refused.contains("range = [0.0, 0.003921"), "{refused}");
+        assert!(read(folder.path(), "a.png", "range = [0.0, 0.0039215689]").is_ok());
+        let as_metallic = toml::from_str::<AdaptedFile>("files = [\"a.png\"]\nencoding = \"linear\"").unwrap();
+        assert!(as_metallic.read(folder.path(), "s", Map::Metallic, None).is_ok());
+        // Twins: black, and a dark picture.
+        for largest in [0, 4] {
+            write(largest);
+            assert!(read(folder.path(), "a.png", "").is_ok(), "{largest}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! index overflows.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_files::untrusted::{hint, mistaken_for, without_mark};
@@ -94,6 +94,19 @@ pub struct ObjMaterial {
     pub metallic: Option<f32>,
     /// `map_Pm`: a file name.
     pub metallic_map: Option<String>,
+    /// Whether and how it shines by itself.
+    pub glow: Glow,
+}
+
+/// Whether a material shines by itself, where some tools put colours that they have baked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Glow {
+    #[default]
+    None,
+    /// In one colour.
+    Plain,
+    /// By a texture.
+    Textured,
 }
 
 /// Whether groups are split where their material changes.
@@ -288,7 +301,9 @@ pub fn material_files(bytes: &[u8]) -> Vec<String> {
 
 /// Reads an MTL file. Every number must be finite; a single number after `Kd` stands for all three.
 pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
-    let text = with_whole_colors(&text_of(bytes)?)?;
+    let text = text_of(bytes)?;
+    let glows = glows(&text);
+    let text = with_whole_colors(&text)?;
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())?;
     let not_finite = |key: &str, material: &tobj::Material| {
         let what = format!("{key} of '{}': expected finite numbers", shortened(&material.name));
@@ -307,9 +322,26 @@ pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
         let map = |key: &str| material.unknown_param.get(key).map(|name| name.trim().to_owned());
         let (roughness_map, metallic_map) = (map("map_Pr"), map("map_Pm"));
         let (name, diffuse, diffuse_map) = (material.name, material.diffuse, material.diffuse_texture);
-        Ok(ObjMaterial { name, diffuse, diffuse_map, roughness, roughness_map, metallic, metallic_map })
+        let glow = glows.get(&name).copied().unwrap_or_default();
+        Ok(ObjMaterial { name, diffuse, diffuse_map, roughness, roughness_map, metallic, metallic_map, glow })
     };
     materials.into_iter().map(read).collect()
+}
+
+/// The materials of an MTL file that shine: by `Ke`, or by `map_Ke` or `map_Ka`, which viewers show without light.
+fn glows(text: &str) -> BTreeMap<String, Glow> {
+    let (mut all, mut name) = (BTreeMap::new(), String::new());
+    for line in text.lines() {
+        let is_lit = |word: &str| word.parse::<f32>().is_ok_and(|value| value != 0.0);
+        if let Some(new) = named_after("newmtl", line) {
+            name = new.to_owned();
+        } else if ["map_Ke", "map_Ka"].iter().any(|key| named_after(key, line).is_some()) {
+            all.insert(name.clone(), Glow::Textured);
+        } else if named_after("Ke", line).is_some_and(|rest| rest.split_whitespace().any(is_lit)) {
+            all.entry(name.clone()).or_insert(Glow::Plain);
+        }
+    }
+    all
 }
 
 /// The text of an MTL file with three numbers after every `Kd` and without the other colours. The format allows one

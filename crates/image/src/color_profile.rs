@@ -21,7 +21,7 @@ const REC709_FROM_D50: [[f64; 3]; 3] = [
     [0.071_945_3, -0.228_991_4, 1.405_242_7],
 ];
 /// sRGB's primaries and white, as cHRM states them.
-const REC709: [f64; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
+pub(crate) const REC709: [f64; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
 /// Profiles within this of sRGB are sRGB: the difference of a third of a byte.
 const SAME: f64 = 1.5e-3;
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -62,6 +62,11 @@ impl Profile {
             // The decoders skip a profile that is damaged.
             if states_icc(bytes) {
                 return Err(unreadable());
+            }
+            if let Some(space) = exif_color_space(&decoder.exif_metadata().ok().flatten().unwrap_or_default()) {
+                return Err(unsupported(format!(
+                    "its EXIF data states {space}, and it has no colour profile; convert the photo to sRGB"
+                )));
             }
             return png.map_or(Ok(()), |info| check_png(&info)).map_err(unsupported).map(|()| None);
         };
@@ -185,6 +190,35 @@ fn name_of(profile: &ColorProfile) -> String {
     };
     let text: String = text.chars().filter(|c| !c.is_control()).take(60).collect();
     if text.is_empty() { "(without a name)".to_owned() } else { text }
+}
+
+/// The colour space that EXIF data states where it is not sRGB (Exif 3.0, section 4.6.6.1, and DCF 2.0, which marks
+/// Adobe RGB by the interoperability index R03).
+fn exif_color_space(exif: &[u8]) -> Option<&'static str> {
+    const EXIF: u16 = 0x8769;
+    const COLOR_SPACE: u16 = 0xa001;
+    const INTEROPERABILITY: u16 = 0xa005;
+    const INDEX: u16 = 1;
+    let is_little = exif.starts_with(b"II");
+    let number = |at: usize, length: usize| {
+        let bytes = exif.get(at..at.checked_add(length)?)?;
+        let shifted = |sum: usize, byte: &u8| sum << 8 | usize::from(*byte);
+        Some(if is_little { bytes.iter().rev().fold(0, shifted) } else { bytes.iter().fold(0, shifted) })
+    };
+    // The place of the value of an entry of the directory at an offset.
+    let value = |directory: usize, tag: u16| {
+        let entries = (0..number(directory, 2)?).map(|entry| directory.saturating_add(2 + 12 * entry));
+        entries.filter(|at| number(*at, 2) == Some(usize::from(tag))).map(|at| at.saturating_add(8)).next()
+    };
+    let directory = number(value(number(4, 4)?, EXIF)?, 4)?;
+    let index = value(directory, INTEROPERABILITY).and_then(|at| value(number(at, 4)?, INDEX));
+    let is_adobe = index.is_some_and(|at| exif.get(at..).is_some_and(|rest| rest.starts_with(b"R03")));
+    match value(directory, COLOR_SPACE).and_then(|at| number(at, 2)) {
+        _ if is_adobe => Some("Adobe RGB"),
+        Some(2) => Some("Adobe RGB"),
+        Some(0xffff) => Some("colours that are not sRGB (ColorSpace 65535)"),
+        _ => None,
+    }
 }
 
 /// What a PNG states before its pixels; none for other files.
@@ -316,6 +350,49 @@ mod tests {
         }
         // Its twin, without a profile.
         assert!(read(&png_with(None, png::ColorType::Rgb, &[])).unwrap().is_none());
+    }
+
+    /// EXIF data of a colour space and an interoperability index, in both byte orders.
+    fn exif(space: u16, index: &[u8; 4], is_little: bool) -> Vec<u8> {
+        let order = |bytes: Vec<u8>| if is_little { bytes } else { bytes.into_iter().rev().collect() };
+        let [short, long] = [2, 4].map(|length| move |value: u32| order(value.to_le_bytes()[..length].to_vec()));
+        let entry = |tag: u32, kind: u32, count: u32, value: Vec<u8>| {
+            let mut bytes = [short(tag), short(kind), long(count), value].concat();
+            bytes.resize(12, 0);
+            bytes
+        };
+        let start = if is_little { b"II".to_vec() } else { b"MM".to_vec() };
+        [
+            [start, short(42), long(8)].concat(),
+            [short(1), entry(0x8769, 4, 1, long(26)), long(0)].concat(),
+            [short(2), entry(0xa001, 3, 1, short(u32::from(space))), entry(0xa005, 4, 1, long(56)), long(0)].concat(),
+            [short(1), entry(1, 2, 4, index.to_vec()), long(0)].concat(),
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn adobe_rgb_by_exif_alone_is_refused() {
+        for is_little in [true, false] {
+            for (space, index, word) in [
+                (0xffff, b"R03\0", "Adobe RGB"),
+                (2, b"R98\0", "Adobe RGB"),
+                (0xffff, b"R98\0", "not sRGB"),
+                (1, b"R03\0", "Adobe RGB"),
+            ] {
+                let found = exif_color_space(&exif(space, index, is_little));
+                assert!(found.is_some_and(|found| found.contains(word)), "{space} {index:?}");
+            }
+            assert_eq!(exif_color_space(&exif(1, b"R98\0", is_little)), None);
+        }
+        for bad in [b"".as_slice(), b"II", b"MM\0*\xff\xff\xff\xff", b"II*\0\x08\0\0\0\xff\xff"] {
+            assert_eq!(exif_color_space(bad), None);
+        }
+        let mut jpeg = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
+        image::ImageEncoder::set_exif_metadata(&mut encoder, exif(0xffff, b"R03\0", true)).unwrap();
+        image::ImageEncoder::write_image(encoder, &[90; 8 * 8 * 3], 8, 8, image::ExtendedColorType::Rgb8).unwrap();
+        assert!(refusal(&jpeg).contains("Adobe RGB"), "{}", refusal(&jpeg));
     }
 
     #[test]

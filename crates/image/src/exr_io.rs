@@ -57,9 +57,14 @@ pub fn read_linear(path: &Path) -> Result<Picture<LinearRgb>, ImageError> {
 }
 
 /// Channels `R`, `G`, `B` of the first layer of an EXR's bytes, or channel `V` or `Y` three times where there is no
-/// `R`. Every value must be finite. `path` serves for errors only.
+/// `R`. Every value must be finite, and the colours those of Rec. 709. `path` serves for errors only.
 pub(crate) fn linear_or_grey_of_bytes(path: &Path, bytes: &[u8]) -> Result<Picture<LinearRgb>, ImageError> {
     let layer = first_layer(path, bytes)?;
+    if ExrHeader::of(bytes).is_ok_and(|header| header.other_primaries) {
+        let what = "its attribute chromaticities states other primaries than those of Rec. 709; convert its colours"
+            .to_owned();
+        return Err(ImageError::Unsupported { path: path.to_owned(), what });
+    }
     let has = |name: &str| layer.channel_data.list.iter().any(|channel| channel.name.eq(name));
     let names = match ["V", "Y"].into_iter().find(|name| has(name)) {
         Some(grey) if !has("R") => [grey; 3],

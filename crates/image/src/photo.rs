@@ -6,7 +6,7 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{ImageDecoder as _, ImageReader};
 
-use crate::color_profile::Profile;
+use crate::color_profile::{Profile, REC709};
 use crate::npy_io::NPY_SIGNATURE;
 use crate::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
@@ -31,6 +31,9 @@ impl PhotoFile {
         if is_turned(&bytes) {
             let what = "its EXIF data asks to turn or mirror it for display; expected a photo that is stored upright";
             return Err(invalid(what.to_owned()));
+        }
+        if let Some(what) = other_radiance(&bytes) {
+            return Err(ImageError::Unsupported { path: path.to_owned(), what });
         }
         let profile = Profile::of(path, &bytes)?;
         let (pixels, _) = texture_and_alpha_of_bytes(path, bytes, Encoding::Srgb, Wrap::Clamp)?;
@@ -78,6 +81,41 @@ impl PhotoFile {
         })
     }
 }
+
+/// What the header of a Radiance HDR states of its numbers that makes them other than linear Rec. 709 (Ward, "Radiance
+/// file formats"); none for other files. Of several exposures and corrections the product counts.
+fn other_radiance(bytes: &[u8]) -> Option<String> {
+    let header = bytes.strip_prefix(b"#?").map(|rest| &rest[..rest.len().min(MOST_HEADER)])?;
+    let end = header.windows(2).position(|two| two == b"\n\n").unwrap_or(header.len());
+    let header = String::from_utf8_lossy(&header[..end]);
+    let stated = |key: &str| {
+        let lines = header.lines().filter_map(|line| line.strip_prefix(key)?.trim_start().strip_prefix('='));
+        let numbers = |text: &str| text.split_whitespace().map_while(|word| word.parse().ok()).collect::<Vec<f64>>();
+        lines.map(|text| numbers(text)).collect::<Vec<_>>()
+    };
+    let differs = |found: f64, expected: f64, by: f64| !((found - expected).abs() <= by);
+    let exposure: f64 = stated("EXPOSURE").iter().flatten().product();
+    if differs(exposure, 1.0, 1e-3) {
+        return Some(format!(
+            "its header states EXPOSURE={exposure}, by which its numbers were multiplied; divide them"
+        ));
+    }
+    let corrected = |channel: usize| stated("COLORCORR").iter().filter_map(|all| all.get(channel)).product::<f64>();
+    if (0..3).any(|channel| differs(corrected(channel), 1.0, 1e-3)) {
+        let factors = [0, 1, 2].map(corrected);
+        return Some(format!(
+            "its header states COLORCORR={factors:?}, by which its colours were multiplied; divide them"
+        ));
+    }
+    let primaries = stated("PRIMARIES").into_iter().next_back()?;
+    let is_rec709 = primaries.len() == 8 && !primaries.iter().zip(REC709).any(|(a, b)| differs(*a, b, MOST_OFF));
+    (!is_rec709).then(|| format!("its header states PRIMARIES={primaries:?}; convert its colours to Rec. 709"))
+}
+
+/// The longest header of a Radiance HDR that is looked at, in bytes.
+const MOST_HEADER: usize = 1 << 16;
+/// The largest difference of a chromaticity that counts as rounding.
+const MOST_OFF: f64 = 0.01;
 
 /// The photo's linear colours by its profile; none for linear numbers, which no profile describes.
 fn converted(pixels: &Texture, profile: &Profile) -> Option<Result<Texture, ImageError>> {
@@ -135,6 +173,47 @@ mod tests {
                 assert!([expected, row, 8.0].iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
             }
         }
+    }
+
+    #[test]
+    fn numbers_that_are_not_linear_rec709_are_refused() {
+        let hdr = |lines: &str| {
+            let pixel = [128, 64, 32, 128];
+            [format!("#?RADIANCE\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n").as_bytes(), &pixel.repeat(2)].concat()
+        };
+        let refused = |bytes: Vec<u8>| PhotoFile::of_bytes(Path::new("a"), bytes).err().map(|error| error.to_string());
+        for (lines, word) in [
+            ("EXPOSURE=2\n", "EXPOSURE=2"),
+            ("EXPOSURE= 2\nEXPOSURE=3\n", "EXPOSURE=6"),
+            ("COLORCORR=1 0.5 1\n", "COLORCORR"),
+            ("PRIMARIES=0.68 0.32 0.265 0.69 0.15 0.06 0.3127 0.329\n", "PRIMARIES"),
+            ("PRIMARIES=0.64\n", "PRIMARIES"),
+        ] {
+            assert!(refused(hdr(lines)).is_some_and(|error| error.contains(word)), "{lines}");
+        }
+        let rec709 = "PRIMARIES=0.64 0.33 0.30 0.60 0.15 0.06 0.3127 0.329\n";
+        for lines in ["", "EXPOSURE=1.0\n", "EXPOSURE=2\nEXPOSURE=0.5\n", "COLORCORR= 1 1 1\n", rec709] {
+            assert_eq!(refused(hdr(lines)), None, "{lines}");
+        }
+        // The same of OpenEXR.
+        let write = |chromaticities: Option<[f32; 8]>| {
+            use exr::meta::attribute::Chromaticities;
+            use exr::prelude::{Image, SpecificChannels, Vec2, WritableImage as _};
+            let pixel = |_: Vec2<usize>| (0.5_f32, 0.2_f32, 0.1_f32);
+            let mut image = Image::from_channels((2, 1), SpecificChannels::rgb(pixel));
+            image.attributes.chromaticities = chromaticities.map(|[a, b, c, d, e, f, g, h]| Chromaticities {
+                red: Vec2(a, b),
+                green: Vec2(c, d),
+                blue: Vec2(e, f),
+                white: Vec2(g, h),
+            });
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            image.write().to_buffered(&mut bytes).unwrap();
+            bytes.into_inner()
+        };
+        let p3 = [0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329];
+        assert!(refused(write(Some(p3))).is_some_and(|error| error.contains("chromaticities")));
+        assert_eq!((refused(write(None)), refused(write(Some(REC709.map(|v| v as f32))))), (None, None));
     }
 
     #[test]

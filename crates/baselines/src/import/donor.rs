@@ -7,6 +7,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec2, Vec3};
 use mateval_dataset::gltf_file::GltfError;
 use mateval_dataset::material::MaterialParameter;
+use mateval_dataset::obj::Glow;
 use mateval_files::source_folder::FileFault;
 use mateval_files::untrusted::shortened;
 use mateval_image::{ImageError, Texture};
@@ -50,6 +51,14 @@ pub(super) fn check_most(found: usize, most: usize, what: &str) -> Result<(), Im
 pub(super) fn count_texels(texels: &mut usize, texture: &Texture) -> Result<(), ImportError> {
     *texels += texture.width() * texture.height();
     check_most(*texels, MAX_TEXELS, "texels in its textures")
+}
+
+/// Numbers this far outside 0 to 1 are rounding, and are clamped.
+const ROUNDING: f32 = 0.001;
+
+/// Whether the number lies within 0 to 1, but for rounding; NaN does not.
+pub(super) fn is_unit(value: &f32) -> bool {
+    (-ROUNDING..=1.0 + ROUNDING).contains(value)
 }
 
 /// The error about a colour that is out of range. `key` is such as `Kd`, or the JSON pointer of a glTF.
@@ -106,8 +115,8 @@ pub struct DonorMaterial {
     pub name: String,
     /// Whether the file states the base colour. Otherwise it is the format's default.
     pub states_base_color: bool,
-    /// Whether the file gives it an emissive texture, where some tools put baked colours.
-    pub glows: bool,
+    /// Whether it shines by itself, where some tools put baked colours.
+    pub glow: Glow,
     /// Linear factor and texture.
     pub base_color: ([f32; 3], Option<Texture>),
     /// Perceptual roughness.
@@ -160,11 +169,13 @@ impl Donor {
     /// Whether the file states the triangle's base colour, by its material or at its corners.
     fn states_base_color(&self, triangle: &DonorTriangle) -> bool {
         let material = &self.materials[triangle.material];
-        // Black or white under an emissive texture is how tools write a baked colour that viewers show without light.
-        let is_baked = match material.base_color {
-            _ if !material.glows => false,
-            ([0.0, 0.0, 0.0], _) => true,
-            ([1.0, 1.0, 1.0], None) => !triangle.is_painted,
+        // Black under emission, or white under an emissive texture, is how tools write a baked colour that viewers show
+        // without light.
+        let is_baked = match (material.glow, &material.base_color) {
+            (Glow::None, _) => false,
+            (_, ([0.0, 0.0, 0.0], _)) => true,
+            (Glow::Textured, ([1.0, 1.0, 1.0], None)) => !triangle.is_painted,
+            (Glow::Textured, (_, Some(texture))) => mean_of(texture) == [0.0; 3],
             _ => false,
         };
         (material.states_base_color || triangle.is_painted) && !is_baked
@@ -186,11 +197,12 @@ impl Donor {
         if self.triangles.is_empty() || self.triangles.iter().any(|triangle| self.states_base_color(triangle)) {
             return Ok(());
         }
-        let glowing = self.triangles.iter().map(|triangle| &self.materials[triangle.material]).find(|m| m.glows);
+        let materials = || self.triangles.iter().map(|triangle| &self.materials[triangle.material]);
+        let glowing = materials().find(|material| material.glow != Glow::None);
         let material = glowing.unwrap_or(&self.materials[self.triangles[0].material]);
-        let advice = match material.glows {
-            true => ", which has an emissive texture over black or white: baked colours belong into baseColorTexture",
-            false => ": bake it to a texture, or state baseColorFactor or COLOR_0",
+        let advice = match material.glow {
+            Glow::None => ": bake it to a texture, or state baseColorFactor or COLOR_0",
+            _ => ", which emits over black or white: baked colours belong into the base colour (baseColorTexture, map_Kd)",
         };
         let name = shortened(&material.name);
         Err(ImportError::Invalid(format!("no material states a base colour, such as '{name}'{advice}")))
@@ -289,11 +301,11 @@ mod tests {
     use super::*;
 
     /// A triangle with one material.
-    fn donor(base_color: [f32; 3], glows: bool, is_painted: bool) -> Donor {
+    fn donor(base_color: [f32; 3], glow: Glow, is_painted: bool) -> Donor {
         let material = DonorMaterial {
             name: "m".to_owned(),
             states_base_color: true,
-            glows,
+            glow,
             base_color: (base_color, None),
             roughness: None,
             metallic: None,
@@ -313,15 +325,21 @@ mod tests {
 
     #[test]
     fn a_colour_that_lies_in_the_emission_is_refused() {
-        for constant in [0.0, 1.0] {
-            let refused = donor([constant; 3], true, false).check_base_color().unwrap_err().to_string();
-            assert!(refused.contains("has an emissive texture over black or white"), "{constant}: {refused}");
+        for (constant, glow) in [(0.0, Glow::Textured), (1.0, Glow::Textured), (0.0, Glow::Plain)] {
+            let refused = donor([constant; 3], glow, false).check_base_color().unwrap_err().to_string();
+            assert!(refused.contains("emits over black or white"), "{constant}: {refused}");
         }
-        // Twins: without an emissive texture, with another colour, and with colours of the vertices.
-        for (constant, glows, is_painted) in [(1.0, false, false), (0.5, true, false), (1.0, true, true)] {
-            assert!(donor([constant; 3], glows, is_painted).check_base_color().is_ok(), "{constant}");
+        // Twins: without emission, with another colour, and with colours of the vertices; a white lamp.
+        for (constant, glow, is_painted) in [
+            (1.0, Glow::None, false),
+            (0.0, Glow::None, false),
+            (0.5, Glow::Textured, false),
+            (1.0, Glow::Textured, true),
+            (1.0, Glow::Plain, false),
+        ] {
+            assert!(donor([constant; 3], glow, is_painted).check_base_color().is_ok(), "{constant}");
         }
-        assert!(donor([1.0; 3], true, false).unstated().contains(&MaterialParameter::BaseColor));
-        assert!(!donor([0.5; 3], true, false).unstated().contains(&MaterialParameter::BaseColor));
+        assert!(donor([1.0; 3], Glow::Textured, false).unstated().contains(&MaterialParameter::BaseColor));
+        assert!(!donor([0.5; 3], Glow::Textured, false).unstated().contains(&MaterialParameter::BaseColor));
     }
 }

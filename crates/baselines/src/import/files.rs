@@ -23,10 +23,15 @@ use crate::maps::{DEFAULT, PartColors};
 /// Endings of mesh files, in the order in which they are preferred.
 const MESHES: [&str; 3] = ["glb", "gltf", "obj"];
 
+/// Endings of mesh files that are not read, but named.
+const OTHER_MESHES: [&str; 12] =
+    ["ply", "fbx", "dae", "stl", "off", "usd", "usda", "usdc", "usdz", "blend", "x3d", "3ds"];
+
 /// Whether a file has the ending of a mesh or of materials, in upper or lower case.
 fn is_importable(name: &str) -> bool {
     let name = name.to_lowercase();
-    MESHES.iter().chain(&["json"]).any(|ending| name.ends_with(&format!(".{ending}")))
+    let mut endings = MESHES.iter().chain(&OTHER_MESHES).chain(&["json"]);
+    endings.any(|ending| name.ends_with(&format!(".{ending}")))
 }
 
 fn stem(name: &str) -> &str {
@@ -65,7 +70,8 @@ impl ImportFolder {
         self.first(scene.as_str(), &["json"])
     }
 
-    /// Meshes, JSON files and folders whose names match no scene or instance, sorted; they are probably misspelt.
+    /// Meshes, JSON files and folders that are not read, sorted: their names match no scene or instance, or their format
+    /// is not read, or another file of the same name is preferred.
     pub fn unused(&self, scenes: &[SceneFile]) -> Vec<String> {
         let mut unused = Vec::new();
         for name in names(&self.path) {
@@ -77,12 +83,15 @@ impl ImportFolder {
                     unused.push(format!("{name}/"));
                 }
                 None if is_importable(&name) => unused.push(name),
+                Some(scene) if !is_folder && is_importable(&name) => {
+                    let read = [self.mesh_of_scene(&scene.id), self.materials_of_scene(&scene.id)];
+                    unused.extend((!read.contains(&Some(name.clone()))).then_some(name));
+                }
                 Some(scene) if is_folder => {
                     let inside = names(&self.path.join(&name)).into_iter().filter(|file| is_importable(file));
                     let is_known = |file: &String| {
-                        let has_name = |instance: &Instance| instance.id.as_str() == stem(file);
-                        MESHES.iter().any(|ending| file.ends_with(&format!(".{ending}")))
-                            && scene.instances.iter().any(has_name)
+                        let read = |instance: &Instance| self.mesh_of_instance(&scene.id, &instance.id);
+                        scene.instances.iter().any(|instance| read(instance) == Some(format!("{name}/{file}")))
                     };
                     unused.extend(inside.filter(|file| !is_known(file)).map(|file| format!("{name}/{file}")));
                 }
@@ -178,4 +187,30 @@ pub fn read_flat_materials<'a>(
         metallic: any(|m| m.metallic.is_some()),
     };
     Ok((colors, given))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn meshes_that_are_not_read_are_named() {
+        let text = include_bytes!("../../../../dataset_spec/examples/scene.json");
+        let scene: SceneFile = json::parse(Path::new("scene.json"), text).unwrap();
+        let (id, instance) = (scene.id.to_string(), scene.instances[0].id.to_string());
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join(&id)).unwrap();
+        for ending in ["glb", "obj", "ply", "mtl"] {
+            std::fs::write(folder.path().join(format!("{id}/{instance}.{ending}")), "").unwrap();
+        }
+        for name in [format!("{id}.gltf"), format!("{id}.obj"), format!("{id}.json"), "else.FBX".to_owned()] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let mut expected = ["else.FBX".to_owned(), format!("{id}.obj")].to_vec();
+        expected.extend(["obj", "ply"].map(|ending| format!("{id}/{instance}.{ending}")));
+        expected.sort();
+        assert_eq!(ImportFolder::new(folder.path()).unused(&[scene]), expected);
+    }
 }

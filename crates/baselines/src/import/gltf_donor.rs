@@ -9,6 +9,7 @@ use gltf::Semantic;
 use gltf::material::PbrSpecularGlossiness;
 use gltf::mesh::Mode;
 use mateval_dataset::gltf_file::{GltfFile, INSTANCING, first_numbers, indices, numbers, parse, triangles, view_bytes};
+use mateval_dataset::obj::Glow;
 use mateval_dataset::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::shortened;
@@ -17,15 +18,13 @@ use mateval_image::{Texture, Wrap};
 
 use super::donor::{
     Donor, DonorGroup, DonorMaterial, DonorTriangle, ImportError, MAX_FILE_BYTES, MAX_TRIANGLES, Scalar, check_most,
-    count_texels, out_of_range, shift_near,
+    count_texels, is_unit, out_of_range, shift_near,
 };
 
 /// Largest number of vertices in a file; a mesh that several nodes share counts for each of them.
 const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 /// Largest depth of the tree of nodes.
 const MAX_DEPTH: usize = 64;
-/// Numbers this far outside 0 to 1 are rounding, and are clamped.
-const ROUNDING: f32 = 0.001;
 
 /// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
 pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor, ImportError> {
@@ -48,7 +47,7 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
     donor.materials.push(DonorMaterial {
         name: "default".to_owned(),
         states_base_color: false,
-        glows: false,
+        glow: Glow::None,
         base_color: ([1.0; 3], None),
         roughness: None,
         metallic: None,
@@ -95,7 +94,11 @@ impl Reader<'_> {
     fn material(&mut self, material: &gltf::Material<'_>, file: &GltfFile) -> Result<DonorMaterial, ImportError> {
         let stated = material.index().and_then(|index| file.stated.get(index)).copied().unwrap_or_default();
         let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
-        let glows = material.emissive_texture().is_some();
+        let glow = match material.emissive_texture() {
+            Some(_) => Glow::Textured,
+            None if material.emissive_factor() == [0.0; 3] => Glow::None,
+            None => Glow::Plain,
+        };
         let pointer = format!("/materials/{}", material.index().unwrap_or(0));
         if let Some(extension) = material.pbr_specular_glossiness() {
             let pointer = format!("{pointer}/extensions/KHR_materials_pbrSpecularGlossiness");
@@ -105,14 +108,7 @@ impl Reader<'_> {
             let read = self.specular_glossiness(&extension, stated.metallic)?;
             let roughness = read.roughness.filter(|_| stated.roughness);
             let metallic = read.metallic.filter(|_| stated.metallic);
-            return Ok(DonorMaterial {
-                name,
-                states_base_color: stated.base_color,
-                glows,
-                roughness,
-                metallic,
-                ..read
-            });
+            return Ok(DonorMaterial { name, states_base_color: stated.base_color, glow, roughness, metallic, ..read });
         }
         let pbr = material.pbr_metallic_roughness();
         let base_color =
@@ -128,7 +124,7 @@ impl Reader<'_> {
         Ok(DonorMaterial {
             name,
             states_base_color: stated.base_color,
-            glows,
+            glow,
             base_color: ([r, g, b], base_color),
             roughness: scalar(roughness, 1).filter(|_| stated.roughness),
             metallic: scalar(metallic, 2).filter(|_| stated.metallic),
@@ -147,7 +143,7 @@ impl Reader<'_> {
         let mut donor = DonorMaterial {
             name: String::new(),
             states_base_color: true,
-            glows: false,
+            glow: Glow::None,
             base_color: (constant.base_color, None),
             roughness: scalar(constant.roughness, None),
             metallic: scalar(constant.metallic, None),
@@ -334,11 +330,6 @@ fn in_range<const N: usize>(pointer: &str, material: &str, found: [f32; N]) -> R
         return Ok(found.map(|value| value.clamp(0.0, 1.0)));
     }
     Err(out_of_range(pointer, material, &found))
-}
-
-/// Whether the number lies within 0 to 1, but for rounding; NaN does not.
-fn is_unit(value: &f32) -> bool {
-    (-ROUNDING..=1.0 + ROUNDING).contains(value)
 }
 
 /// The colours of a primitive's vertices, clamped to 0 to 1. The error shows the largest of those that are out of

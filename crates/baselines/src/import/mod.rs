@@ -48,8 +48,12 @@ pub fn write(
 ) -> Result<ImportReport, BaselineError> {
     let files = ImportFolder::new(folder);
     if !dataset.scenes.iter().any(|scene| has_files(&files, scene)) {
-        let why = "holds no file for any scene of the dataset; expected <scene>/<instance>.glb, <scene>.glb (or .gltf, \
-                   .obj) or <scene>.json";
+        let found = files.unused(&dataset.scenes);
+        let found = found.first().map_or(String::new(), |name| format!("; it holds '{name}'"));
+        let why = format!(
+            "holds no file for any scene of the dataset; expected <scene>/<instance>.glb, <scene>.glb (or .gltf, .obj) or \
+             <scene>.json{found}"
+        );
         return Err(BaselineError::unusable(folder, why));
     }
     let mut scenes = Vec::new();

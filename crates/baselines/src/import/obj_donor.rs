@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_dataset::obj::{self, Materials, ObjLimits, ObjMaterial};
+use mateval_dataset::obj::{self, Glow, Materials, ObjLimits, ObjMaterial};
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::shortened;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
@@ -14,8 +14,8 @@ use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texture, Wrap};
 
 use super::donor::{
-    Donor, DonorGroup, DonorMaterial, DonorTriangle, ImportError, MAX_TRIANGLES, Scalar, count_texels, out_of_range,
-    shift_near,
+    Donor, DonorGroup, DonorMaterial, DonorTriangle, ImportError, MAX_TRIANGLES, Scalar, count_texels, is_unit,
+    out_of_range, shift_near,
 };
 
 /// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
@@ -79,7 +79,7 @@ fn painted() -> DonorMaterial {
     DonorMaterial {
         name: "vertex colours".to_owned(),
         states_base_color: true,
-        glows: false,
+        glow: Glow::None,
         base_color: ([1.0; 3], None),
         roughness: None,
         metallic: None,
@@ -135,7 +135,8 @@ impl Reader<'_> {
             Some(name) => ([1.0; 3], Some(self.texture(name, Encoding::Srgb)?)),
             None => {
                 let missing = || format!("material '{}' has neither map_Kd nor Kd", shortened(&material.name));
-                (material.diffuse.ok_or_else(|| ImportError::Invalid(missing()))?, None)
+                let stated = material.diffuse.ok_or_else(|| ImportError::Invalid(missing()))?;
+                (stated.map(|value| value.clamp(0.0, 1.0)), None)
             }
         };
         let mut scalar = |factor: Option<f32>, map: &Option<String>| match map {
@@ -143,7 +144,10 @@ impl Reader<'_> {
                 let texture = self.texture(name, Encoding::Linear)?;
                 Ok(Some(Scalar { factor: 1.0, texture: Some((texture, 0)) }))
             }
-            None => Ok::<_, ImportError>(factor.map(|factor| Scalar { factor, texture: None })),
+            None => {
+                let clamped = |factor: f32| Scalar { factor: factor.clamp(0.0, 1.0), texture: None };
+                Ok::<_, ImportError>(factor.map(clamped))
+            }
         };
         let roughness = scalar(material.roughness, &material.roughness_map)?;
         let metallic = scalar(material.metallic, &material.metallic_map)?;
@@ -153,12 +157,12 @@ impl Reader<'_> {
             material.metallic.as_slice(),
         ];
         for (key, found) in [("Kd", diffuse), ("Pr", own_roughness), ("Pm", own_metallic)] {
-            if !found.iter().all(|v| (0.0..=1.0).contains(v)) {
+            if !found.iter().all(is_unit) {
                 return Err(out_of_range(key, &material.name, found));
             }
         }
-        let name = material.name.clone();
-        Ok(DonorMaterial { name, states_base_color: true, glows: false, base_color, roughness, metallic })
+        let (name, glow) = (material.name.clone(), material.glow);
+        Ok(DonorMaterial { name, states_base_color: true, glow, base_color, roughness, metallic })
     }
 
     fn texture(&mut self, name: &str, encoding: Encoding) -> Result<Texture, ImportError> {
@@ -180,11 +184,27 @@ mod tests {
 
     /// A triangle whose vertices are red, with this MTL text behind its `newmtl` line.
     fn red(material: &str) -> Donor {
+        read_red(material).unwrap()
+    }
+
+    fn read_red(material: &str) -> Result<Donor, ImportError> {
         let folder = tempfile::tempdir().unwrap();
         let vertices = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\n";
         std::fs::write(folder.path().join("a.obj"), format!("mtllib a.mtl\n{vertices}usemtl m\nf 1 2 3\n")).unwrap();
         std::fs::write(folder.path().join("a.mtl"), format!("newmtl m\n{material}\n")).unwrap();
-        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.obj", DVec3::ZERO).unwrap()
+        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.obj", DVec3::ZERO)
+    }
+
+    #[test]
+    fn colours_baked_to_emission_are_refused_and_rounding_is_not() {
+        for baked in ["Kd 0 0 0\nKe 0.8 0.2 0.1", "Kd 0 0 0\nmap_Ke a.png", "Kd 0 0 0\nKa 1 1 1\nmap_Ka a.png"] {
+            let refused = read_red(baked).err().map(|error| error.to_string());
+            assert!(refused.is_some_and(|error| error.contains("emits over black or white")), "{baked}");
+        }
+        for sound in ["Kd 0 0 0\nKe 0 0 0", "Kd 0.5 0 0\nKe 1 1 1", "Kd 1.0000001 0.5 0\nPr 1.0005", "Kd 0 0 0"] {
+            assert!(read_red(sound).is_ok(), "{sound}");
+        }
+        assert!(read_red("Kd 1.01 0.5 0").is_err_and(|error| error.to_string().contains("expected 0 to 1")));
     }
 
     #[test]

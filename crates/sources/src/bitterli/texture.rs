@@ -158,7 +158,15 @@ impl<'a> Reader<'a> {
         let wrap = self.wrap(&mut from, element);
         self.check_filter(&mut from, element);
         let uv = self.uv_transform(&mut from);
-        let channel = from.string("channel").and_then(|text| text.trim().to_ascii_lowercase().chars().next());
+        let channel = from.string("channel").and_then(|text| {
+            let letter = text.trim().to_ascii_lowercase().chars().next().filter(|letter| "rgba".contains(*letter));
+            if letter.is_none() {
+                let message = format!("line {}: the channel '{}' is not known", element.line, shortened(text));
+                self.log.warn("bad_value", place, message, "used all channels");
+                from.mark_replaced("channel");
+            }
+            letter
+        });
         from.ignore(&["cache", "max_anisotropy", "format", "accel"]);
         let is_exact = !from.is_any_replaced();
         from.finish(&mut self.log);

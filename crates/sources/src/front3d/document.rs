@@ -1,6 +1,8 @@
 //! Parses JSON within limits on memory, and looks up values in it. Lookups treat a value of the wrong type as missing,
 //! since the data has both.
 
+use std::borrow::Cow;
+
 use mateval_files::untrusted::{hint, without_mark};
 use serde_json::Value;
 
@@ -54,6 +56,8 @@ pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, Invalid> {
 /// Parses any JSON. Fails where the text is not JSON or exceeds `limits`.
 pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, Invalid> {
     let text = without_mark(text);
+    // As in glTF, the file may be padded with NUL.
+    let text = &text[..text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1)];
     check_json(text, limits.json_values, limits.json_containers)?;
     serde_json::from_slice(text).map_err(|reason| Invalid(format!("expected JSON: {reason}{}", hint(text))))
 }
@@ -76,6 +80,22 @@ const LONGEST_TEXT: usize = 4096;
 /// The trimmed text at `key`, unless it is empty or longer than [`LONGEST_TEXT`].
 pub(super) fn text<'a>(from: &'a Value, key: &str) -> Option<&'a str> {
     from.get(key).and_then(Value::as_str).map(str::trim).filter(|text| (1..=LONGEST_TEXT).contains(&text.len()))
+}
+
+/// The id at `key`: a text, or a whole number, which stands for its digits.
+pub(super) fn id_of<'a>(from: &'a Value, key: &str) -> Option<Cow<'a, str>> {
+    let number = || from.get(key).and_then(Value::as_u64).map(|number| Cow::Owned(number.to_string()));
+    text(from, key).map(Cow::Borrowed).or_else(number)
+}
+
+/// The truth value that a value holds: true or false, or 1 or 0, or a text of one of them.
+pub(super) fn boolean(value: &Value) -> Option<bool> {
+    match value {
+        Value::Bool(found) => Some(*found),
+        Value::String(text) if text.trim().eq_ignore_ascii_case("true") => Some(true),
+        Value::String(text) if text.trim().eq_ignore_ascii_case("false") => Some(false),
+        other => number(other).filter(|number| [0.0, 1.0].contains(number)).map(|number| number == 1.0),
+    }
 }
 
 /// The list at `key`; empty where there is none.
@@ -114,6 +134,34 @@ mod tests {
         }
         // Brackets and commas within texts do not count.
         assert!(parse(br#"{"a": "[[[[[[{{{,,,,,,,,,,,,,,,, \" [[[ \\"}"#, &small()).is_ok());
+    }
+
+    #[test]
+    fn ids_and_truth_values_may_have_other_types() {
+        let value = serde_json::json!({"a": 7, "b": " 7 ", "c": 7.5, "d": [7]});
+        assert_eq!(
+            ["a", "b", "c", "d", "e"].map(|key| id_of(&value, key)),
+            [Some("7"), Some("7"), None, None, None].map(|id| id.map(Cow::from))
+        );
+        let of = |value: Value| boolean(&value);
+        for value in [serde_json::json!(true), serde_json::json!("True"), serde_json::json!(1), serde_json::json!("1")]
+        {
+            assert_eq!(of(value), Some(true));
+        }
+        for value in [serde_json::json!(false), serde_json::json!("FALSE "), serde_json::json!(0.0)] {
+            assert_eq!(of(value), Some(false));
+        }
+        for value in
+            [serde_json::json!("yes"), serde_json::json!(2), serde_json::json!(null), serde_json::json!([true])]
+        {
+            assert_eq!(of(value), None);
+        }
+    }
+
+    #[test]
+    fn padding_is_skipped() {
+        assert!(parse(b"\xef\xbb\xbf{}\n\0\0", &small()).is_ok());
+        assert!(parse(b"\0\0", &small()).is_err());
     }
 
     #[test]

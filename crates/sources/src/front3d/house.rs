@@ -1,6 +1,7 @@
 //! The checked content of a 3D-FRONT house's JSON: its rooms, what they contain, and where. Every key of the JSON may
 //! be missing, repeated or of the wrong type; repairs are findings.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use mateval_dataset::{Severity, TriangleMesh};
 use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
-use super::document::{Limits, kind, list, number, numbers, parse, text};
+use super::document::{Limits, boolean, id_of, kind, list, number, numbers, parse, text};
 use super::house_mesh;
 use crate::log::Log;
 use crate::open::{Invalid, SourceError, open};
@@ -89,6 +90,10 @@ pub struct Room {
     /// The product of the scene's and the room's transforms, less the house's shift; the identity in every known file.
     pub(crate) house_from_room: DMat4,
     pub(crate) children: Vec<Child>,
+    /// The number of meshes that the file puts into it.
+    pub(crate) meshes: usize,
+    /// The uids of those that do not exist or could not be read.
+    pub(crate) lost_meshes: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -201,15 +206,15 @@ fn first_of_each_uid<'a>(tree: &'a Value, key: &str, log: &mut Log) -> Vec<(usiz
     let mut records = Vec::new();
     for (at, record) in list(tree, key).iter().enumerate() {
         let place = format!("/{key}/{at}");
-        let Some(uid) = text(record, "uid") else {
+        let Some(uid) = id_of(record, "uid") else {
             let message = format!("expected an object with a uid, found {} without one", kind(record));
             log.warn("no_uid", &place, message, "left it out");
             continue;
         };
-        if seen.insert(uid) {
-            records.push((at, uid.to_owned(), record));
+        if seen.insert(uid.clone()) {
+            records.push((at, uid.into_owned(), record));
         } else {
-            let message = format!("the uid '{}' is already used", shortened(uid));
+            let message = format!("the uid '{}' is already used", shortened(&uid));
             log.note("duplicate_uid", &place, message, "kept the first record");
         }
     }
@@ -217,15 +222,29 @@ fn first_of_each_uid<'a>(tree: &'a Value, key: &str, log: &mut Log) -> Vec<(usiz
 }
 
 fn furniture(tree: &Value, log: &mut Log) -> Vec<FurnitureRecord> {
-    let record = |(at, uid, record): (usize, String, &Value)| FurnitureRecord {
-        uid,
-        jid: text(record, "jid").unwrap_or("").to_owned(),
-        valid: record.get("valid").and_then(Value::as_bool) == Some(true),
-        category: text(record, "category").map(str::to_owned),
-        title: text(record, "title").map(str::to_owned),
-        place: format!("/furniture/{at}"),
-    };
-    first_of_each_uid(tree, "furniture", log).into_iter().map(record).collect()
+    let mut records = Vec::new();
+    for (at, uid, record) in first_of_each_uid(tree, "furniture", log) {
+        let place = format!("/furniture/{at}");
+        records.push(FurnitureRecord {
+            uid,
+            jid: id_of(record, "jid").unwrap_or_default().into_owned(),
+            valid: is_true(record, "valid", &place, "left its pieces out", log),
+            category: text(record, "category").map(str::to_owned),
+            title: text(record, "title").map(str::to_owned),
+            place,
+        });
+    }
+    records
+}
+
+/// Whether the value at `key` is true; an absent one is not. Anything that is neither true nor false is reported.
+fn is_true(record: &Value, key: &str, place: &str, action: &str, log: &mut Log) -> bool {
+    let Some(found) = record.get(key).filter(|found| !found.is_null()) else { return false };
+    boolean(found).unwrap_or_else(|| {
+        let message = format!("expected true or false, found {}", kind(found));
+        log.warn("bad_value", &format!("{place}/{key}"), message, action);
+        false
+    })
 }
 
 fn materials(tree: &Value, log: &mut Log) -> Vec<HouseMaterial> {
@@ -238,16 +257,16 @@ fn materials(tree: &Value, log: &mut Log) -> Vec<HouseMaterial> {
 fn material(uid: String, record: &Value, place: String, log: &mut Log) -> HouseMaterial {
     let by_color = match text(record, "colorMode") {
         Some(mode) => mode.eq_ignore_ascii_case("color"),
-        None => record.get("useColor").and_then(Value::as_bool) == Some(true),
+        None => is_true(record, "useColor", &place, "used the texture", log),
     };
-    let jid = text(record, "jid").filter(|jid| !by_color && *jid != "local");
+    let jid = id_of(record, "jid").filter(|jid| !by_color && jid != "local");
     if text(record, "normaltexture").is_some() {
         let place = format!("{place}/normaltexture");
         log.note("normal_map", &place, "a normal map whose file is not public", "left it out");
     }
     HouseMaterial {
         uid,
-        texture: jid.map(str::to_owned),
+        texture: jid.map(Cow::into_owned),
         content: content(record),
         color: color(record, &place, log),
         uv: uv_transform(record, &place, log),
@@ -267,12 +286,12 @@ fn content(record: &Value) -> Option<String> {
 fn color(record: &Value, place: &str, log: &mut Log) -> Option<[f64; 3]> {
     let found = record.get("color")?;
     let all: Vec<f64> = found.as_array().into_iter().flatten().map_while(number).collect();
-    // Fractions below 1 are colours of 0 to 1, as other formats have them.
-    let is_of_255 = |rgb: &[f64; 3]| rgb.iter().any(|v| *v > 1.0) || rgb.iter().all(|v| v.fract() == 0.0);
+    // Numbers up to 1 are colours of 0 to 1, as other formats have them, or nearly black.
+    let is_of_255 = |rgb: &[f64; 3]| rgb.iter().any(|v| *v > 1.0) || *rgb == [0.0; 3];
     let found = match all.first_chunk::<3>() {
         Some(rgb) if !rgb.iter().all(|v| (0.0..=255.0).contains(v)) => format!("{rgb:?}"),
         Some(rgb) if is_of_255(rgb) => return Some(*rgb),
-        Some(rgb) => format!("fractions of 1: {rgb:?}"),
+        Some(rgb) => format!("numbers up to 1, which are probably fractions of 1: {rgb:?}"),
         None => kind(found).to_owned(),
     };
     let message = format!("expected 3 or 4 numbers of 0 to 255, found {found}");
@@ -310,13 +329,18 @@ fn meshes(
                 "{place}: expected at most {most} triangles in all meshes together, found more"
             )));
         }
-        let named = text(record, "material");
-        let material = named.and_then(|uid| material_of.get(uid)).copied();
+        let named = id_of(record, "material").unwrap_or_default();
+        let material = material_of.get(&*named).copied();
         if material.is_none() {
-            let message = format!("no material has the uid '{}'", shortened(named.unwrap_or("")));
+            let message = format!("no material has the uid '{}'", shortened(&named));
             log.warn("no_material", &format!("{place}/material"), message, "used mid-grey");
         }
-        let kind = text(record, "type").unwrap_or("Other").to_owned();
+        let kind = text(record, "type").unwrap_or_else(|| {
+            let message = "expected a type, as in WallInner, found none";
+            log.note("no_type", &place, message, "took it for architecture that gives no light");
+            "Other"
+        });
+        let kind = kind.to_owned();
         meshes.push(HouseMesh { uid, kind, mesh, base, material, place });
     }
     Ok(meshes)
@@ -343,7 +367,7 @@ fn rooms(
     let records = Records {
         furniture: furniture.iter().enumerate().map(|(k, record)| (record.uid.as_str(), k)).collect(),
         meshes: meshes.iter().enumerate().map(|(k, mesh)| (mesh.uid.as_str(), k)).collect(),
-        listed_meshes: list(tree, "mesh").iter().filter_map(|record| text(record, "uid")).collect(),
+        listed_meshes: list(tree, "mesh").iter().filter_map(|record| id_of(record, "uid")).collect(),
     };
     // Every room, within the limit on children.
     let mut rooms: Vec<Room> = Vec::new();
@@ -358,16 +382,19 @@ fn rooms(
             )));
         }
         let id = room_id(record, at, &rooms, &place, log);
-        let children = list(record, "children").iter().enumerate();
-        let children = children.filter_map(|(at, child)| {
+        let (mut children, mut meshes, mut lost_meshes) = (Vec::new(), 0, Vec::new());
+        for (at, child) in list(record, "children").iter().enumerate() {
             let place = format!("{place}/children/{at}");
-            let what = child_kind(child, &place, &records, log)?;
-            Some(Child { what, placement: placement(child, &place, log), place })
-        });
-        let children = children.collect();
+            meshes += usize::from(is_mesh(child));
+            match child_kind(child, &place, &records, log) {
+                Some(what) => children.push(Child { what, placement: placement(child, &place, log), place }),
+                None if is_mesh(child) => lost_meshes.push(id_of(child, "ref").unwrap_or_default().into_owned()),
+                None => {}
+            }
+        }
         let kind = text(record, "type").unwrap_or("OtherRoom").to_owned();
         let house_from_room = house_from_scene * placement(record, &place, log).matrix();
-        rooms.push(Room { id, kind, house_from_room, children });
+        rooms.push(Room { id, kind, house_from_room, children, meshes, lost_meshes });
     }
     Ok(rooms)
 }
@@ -391,23 +418,29 @@ struct Records<'a> {
     furniture: BTreeMap<&'a str, usize>,
     meshes: BTreeMap<&'a str, usize>,
     /// The uids of all meshes, including those that were left out.
-    listed_meshes: BTreeSet<&'a str>,
+    listed_meshes: BTreeSet<Cow<'a, str>>,
 }
 
 /// The record that a child refers to. In later releases half of the references to furniture are dangling, since those
 /// pieces are not public.
 fn child_kind(child: &Value, place: &str, records: &Records<'_>, log: &mut Log) -> Option<ChildKind> {
-    let target = text(child, "ref").unwrap_or("");
-    let furniture = || records.furniture.get(target).copied().map(ChildKind::Furniture);
-    let mesh = || records.meshes.get(target).copied().map(ChildKind::Mesh);
-    let is_mesh = text(child, "instanceid").is_some_and(|id| id.starts_with("mesh/"));
-    let found = if is_mesh { mesh().or_else(furniture) } else { furniture().or_else(mesh) };
+    let target = id_of(child, "ref").unwrap_or_default();
+    let furniture = || records.furniture.get(&*target).copied().map(ChildKind::Furniture);
+    let mesh = || records.meshes.get(&*target).copied().map(ChildKind::Mesh);
+    let found = if is_mesh(child) { mesh().or_else(furniture) } else { furniture().or_else(mesh) };
     // A mesh that was left out has been reported already.
-    if found.is_none() && !records.listed_meshes.contains(target) {
-        let message = format!("no record has the uid '{}'", shortened(target));
-        log.note("dangling_ref", &format!("{place}/ref"), message, "left it out");
+    if found.is_none() && !records.listed_meshes.contains(&target) {
+        let message = format!("no record has the uid '{}'", shortened(&target));
+        let severity = if is_mesh(child) { Severity::Warning } else { Severity::Note };
+        let file = log.file().to_owned();
+        log.push(severity, "dangling_ref", &file, &format!("{place}/ref"), message, "left it out");
     }
     found
+}
+
+/// Whether a child of a room refers to a mesh.
+fn is_mesh(child: &Value) -> bool {
+    text(child, "instanceid").is_some_and(|id| id.starts_with("mesh/"))
 }
 
 fn placement(record: &Value, place: &str, log: &mut Log) -> Placement {
@@ -531,6 +564,66 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+
+    fn read_tree(tree: &Value) -> (House, Vec<String>) {
+        let mut log = Log::new("house.json".to_owned(), 100);
+        let house = read(tree, "small", &Limits::default(), &mut log).unwrap();
+        (house, log.into_findings().into_iter().map(|finding| format!("{} {}", finding.code, finding.place)).collect())
+    }
+
+    #[test]
+    fn ids_and_truth_values_of_other_types_count() {
+        let piece = |uid: Value, valid: Value| json!({"uid": uid, "jid": 12, "valid": valid});
+        let child = |of: Value| json!({"ref": of, "instanceid": "furniture/1"});
+        let tree = json!({
+            "furniture": [
+                piece(json!(7), json!("true")), piece(json!("8"), json!(1)), piece(json!("9"), json!("no")),
+                piece(json!("10"), Value::Null),
+            ],
+            "material": [
+                {"uid": 3, "jid": "t", "useColor": "True"}, {"uid": "4", "jid": "t", "useColor": 0},
+                {"uid": "5", "jid": "t"},
+            ],
+            "scene": {"room": [{"instanceid": "R", "children": [child(json!("7")), child(json!(8)), child(json!(9))]}]}
+        });
+        let (house, findings) = read_tree(&tree);
+        assert_eq!(house.furniture.iter().map(|piece| piece.valid).collect::<Vec<_>>(), [true, true, false, false]);
+        assert_eq!((house.furniture[0].jid.as_str(), house.rooms[0].children.len()), ("12", 3));
+        let textures: Vec<_> = house.materials.iter().map(|material| material.texture.as_deref()).collect();
+        assert_eq!(textures, [None, Some("t"), Some("t")]);
+        assert_eq!(findings, ["bad_value /furniture/2/valid"]);
+    }
+
+    #[test]
+    fn meshes_that_rooms_lack_are_counted() {
+        let mesh = json!({"uid": "a", "xyz": [0, 0, 0, 1, 0, 0, 0, 1, 0], "faces": [0, 1, 2]});
+        let child = |of: &str, what: &str| json!({"ref": of, "instanceid": what});
+        let children = [child("a", "mesh/1"), child("b", "mesh/2"), child("c", "mesh/3"), child("d", "furniture/1")];
+        let (house, findings) =
+            read_tree(&json!({"mesh": [mesh], "scene": {"room": [{"instanceid": "R", "children": children}]}}));
+        assert_eq!(
+            (house.rooms[0].meshes, house.rooms[0].lost_meshes.as_slice()),
+            (3, &["b".to_owned(), "c".to_owned()][..])
+        );
+        let dangling = findings.iter().filter(|finding| finding.starts_with("dangling_ref")).count();
+        assert_eq!(dangling, 3, "{findings:?}");
+    }
+
+    #[test]
+    fn numbers_up_to_1_are_no_colours_of_255() {
+        for (color, expected) in [
+            (json!([1, 1, 1]), None),
+            (json!([1, 0, 0, 1]), None),
+            (json!([0.5, 0.25, 1]), None),
+            (json!([0, 0, 0]), Some([0.0; 3])),
+            (json!([2, 1, 0]), Some([2.0, 1.0, 0.0])),
+            (json!(["255", "128", "0"]), Some([255.0, 128.0, 0.0])),
+        ] {
+            let mut log = Log::new("house.json".to_owned(), 100);
+            let found = super::color(&json!({ "color": color }), "/material/0", &mut log);
+            assert_eq!((found, log.into_findings().len()), (expected, usize::from(expected.is_none())), "{color}");
+        }
+    }
 
     #[test]
     fn only_cameras_of_the_house_sorted_by_number() {

@@ -37,6 +37,10 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<(Triangle
 /// The numbers at `key`. Anything else is read as NaN, which is handled with the numbers that are not finite; the first
 /// such entry is reported. A null is what JSON has for NaN.
 fn numbers(from: &Value, key: &str, place: &str, log: &mut Log) -> Vec<f64> {
+    if let Some(found) = from.get(key).filter(|found| !found.is_array() && !found.is_null()) {
+        let message = format!("expected a list of numbers, found {}", kind(found));
+        log.warn("bad_number", &format!("{place}/{key}"), message, "treated it as absent");
+    }
     let all = list(from, key);
     let is_other = |value: &&Value| !value.is_null() && number(value).is_none();
     if let Some(at) = all.iter().position(|value| is_other(&value)) {
@@ -66,7 +70,7 @@ fn positions(xyz: &[f64], base: DVec3) -> Vec<Vec3> {
 }
 
 fn faces(from: &Value, place: &str, log: &mut Log) -> Vec<[u32; 3]> {
-    let all = list(from, "faces");
+    let all = numbers(from, "faces", place, log);
     if !all.len().is_multiple_of(3) {
         let message = format!("expected a multiple of 3 vertex indices, found {}", all.len());
         log.warn("bad_faces", &format!("{place}/faces"), message, "left the last ones out");
@@ -74,8 +78,8 @@ fn faces(from: &Value, place: &str, log: &mut Log) -> Vec<[u32; 3]> {
     // Anything that is not an index becomes an index that no mesh has.
     let whole =
         |value: f64| (value >= 0.0 && value.fract() == 0.0 && value < f64::from(u32::MAX)).then_some(value as u32);
-    let index = |value: &Value| number(value).and_then(whole).unwrap_or(u32::MAX);
-    all.as_chunks::<3>().0.iter().map(|face| [0, 1, 2].map(|corner| index(&face[corner]))).collect()
+    let index = |value: f64| whole(value).unwrap_or(u32::MAX);
+    all.as_chunks::<3>().0.iter().map(|face| face.map(index)).collect()
 }
 
 /// Drops triangles whose vertices are missing or have positions that are not finite.
@@ -212,12 +216,26 @@ mod tests {
         for (key, value, triangles, other) in [
             ("xyz", json!([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, "1,5"]), 1, "bad_faces /mesh/0/faces"),
             ("uv", json!([0, 0, 1, 0, 1, 1, 0, "nan"]), 2, "bad_uv /mesh/0/uv"),
+            ("faces", json!([0, 1, 2, 0, 2, "three"]), 1, "bad_faces /mesh/0/faces"),
         ] {
-            let (mesh, findings) = read_one(with(key, value));
-            let at = if key == "xyz" { 11 } else { 7 };
+            let (mesh, findings) = read_one(with(key, value.clone()));
+            let at = value.as_array().unwrap().len() - 1;
             assert!(findings.contains(&format!("bad_number /mesh/0/{key}/{at}")), "{findings:?}");
             assert!(findings.contains(&other.to_owned()) && findings.len() == 2, "{findings:?}");
             assert_eq!(mesh.unwrap().triangles.len(), triangles);
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_list_is_named() {
+        for (key, value, place) in [
+            ("xyz", json!("0 0 0 1 0 0"), "/mesh/0/xyz"),
+            ("faces", json!({ "a": 1 }), "/mesh/0/faces"),
+            ("faces", json!([[0, 1, 2], [0, 2, 3]]), "/mesh/0/faces/0"),
+            ("xyz", json!([[0, 0, 0], [1, 0, 0]]), "/mesh/0/xyz/0"),
+        ] {
+            let (mesh, findings) = read_one(with(key, value));
+            assert!(mesh.is_none() && findings.contains(&format!("bad_number {place}")), "{findings:?}");
         }
     }
 

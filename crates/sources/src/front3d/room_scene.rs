@@ -15,7 +15,7 @@ use mateval_tracer::aov::{coarse_subpixels, hit_through};
 use rayon::prelude::*;
 
 use super::furnish::FurnishedHouse;
-use super::house::ChildKind;
+use super::house::{ChildKind, Room};
 use super::material_class::AppearanceRule;
 use crate::source_scene::{Missing, SourceScene};
 
@@ -54,8 +54,36 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     }
 }
 
-/// The models and textures of the room's pieces that are not there or cannot be read.
+/// What is missing of the room: meshes of its architecture, all textures of these, or the models and textures of its
+/// furniture, whichever share is larger.
 fn missing(house: &FurnishedHouse, room: usize) -> Missing {
+    let Room { meshes: wanted, lost_meshes, .. } = &house.house.rooms[room];
+    let files = lost_meshes.iter().map(|uid| format!("mesh {uid}")).collect();
+    let meshes = Missing { what: "meshes of the room's architecture", wanted: *wanted, files };
+    let share = |missing: &Missing| missing.files.len() as f64 / missing.wanted.max(1) as f64;
+    let larger = |one: Missing, other: Missing| if share(&other) > share(&one) { other } else { one };
+    larger(larger(missing_furniture(house, room), meshes), missing_textures(house, room))
+}
+
+/// The textures of the room's architecture, where none of them exists: the folder is probably another. A few that are
+/// missing leave base colours unstated, which is judged by what the camera sees.
+fn missing_textures(house: &FurnishedHouse, room: usize) -> Missing {
+    let materials = house.house.rooms[room].children.iter().filter_map(|child| match child.what {
+        ChildKind::Mesh(mesh) => house.house.meshes[mesh].material,
+        ChildKind::Furniture(_) => None,
+    });
+    let ids = materials.filter_map(|material| house.house.materials[material].texture.as_deref());
+    let ends: BTreeSet<String> = ids.map(|id| format!("{id}/texture.png")).collect();
+    let absent = |end: &String| house.absent.iter().find(|path| path.ends_with(end.as_str())).cloned();
+    let (wanted, mut files) = (ends.len(), ends.iter().filter_map(absent).collect::<Vec<_>>());
+    if files.len() < wanted {
+        files.clear();
+    }
+    Missing { what: "textures of the room's architecture", wanted, files }
+}
+
+/// The models and textures of the room's pieces that are not there or cannot be read.
+fn missing_furniture(house: &FurnishedHouse, room: usize) -> Missing {
     let records = house.house.rooms[room].children.iter().filter_map(|child| match child.what {
         ChildKind::Furniture(record) => Some(&house.house.furniture[record]).filter(|record| record.valid),
         ChildKind::Mesh(_) => None,

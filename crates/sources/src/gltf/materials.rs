@@ -20,6 +20,8 @@ const DEFAULT_IOR: f32 = 1.5;
 const MOST_REFLECTANCE: f32 = 0.08;
 /// From this share of transmitted light on a material is glass.
 const GLASS: f32 = 0.5;
+/// Factors this far outside of 0 to 1 are rounding.
+const ROUNDING: f32 = 0.001;
 
 /// The lookups of a material's textures. All are looked up at the uv set of the first; the mean stands for a texture at
 /// another set, since a mesh has one uv.
@@ -56,6 +58,15 @@ impl<'a> Lookups<'a> {
     }
 }
 
+/// Whether the base colour of a material can be another than black.
+fn shows_color(material: &gltf::Material<'_>) -> bool {
+    let [red, green, blue, _] = match material.pbr_specular_glossiness() {
+        Some(extension) => extension.diffuse_factor(),
+        None => material.pbr_metallic_roughness().base_color_factor(),
+    };
+    [red, green, blue] != [0.0; 3]
+}
+
 impl Reader<'_> {
     /// The material of a primitive, read when it is first used.
     pub(super) fn material(&mut self, material: &gltf::Material<'_>) -> ReadMaterial {
@@ -70,8 +81,14 @@ impl Reader<'_> {
         let glow = self.glow(material, &lookups, &pointer);
         let own_name = || material.index().map_or_else(|| "default".to_owned(), |index| format!("material {index}"));
         let name = material.name().map(shortened).unwrap_or_else(own_name);
-        let index = self.scene.add_material(Material { opacity, ..Material::new(name, model) });
         let stated = self.known(self.stated(material), material, &lookups, &pointer);
+        let stated = self.in_range(stated, material, &pointer);
+        if lookups.emissive.is_some() && glow.is_some() && !(stated.base_color && shows_color(material)) {
+            let message = format!("'{name}' emits by a texture and has no base colour but black or a default");
+            let action = "took it for a lamp; colours that were baked to emission belong in the base colour";
+            self.log.warn("only_emission", &pointer, message, action);
+        }
+        let index = self.scene.add_material(Material { opacity, ..Material::new(name, model) });
         let read = ReadMaterial { index, uv_set: lookups.set(), stated, glow };
         self.materials.insert(material.index(), read);
         read
@@ -125,6 +142,45 @@ impl Reader<'_> {
         }
     }
 
+    /// What the file states of a material, without the parameters whose factors lie outside of 0 to 1 by more than
+    /// rounding, which is a finding.
+    fn in_range(
+        &mut self,
+        mut stated: StatedParameters,
+        material: &gltf::Material<'_>,
+        pointer: &str,
+    ) -> StatedParameters {
+        let pbr = material.pbr_metallic_roughness();
+        let color = |[red, green, blue, _]: [f32; 4]| vec![red, green, blue];
+        let factors = match material.pbr_specular_glossiness() {
+            Some(extension) => [
+                ("diffuseFactor", color(extension.diffuse_factor())),
+                ("specularFactor", extension.specular_factor().to_vec()),
+                ("glossinessFactor", vec![extension.glossiness_factor()]),
+            ],
+            None => [
+                ("baseColorFactor", color(pbr.base_color_factor())),
+                ("metallicFactor", vec![pbr.metallic_factor()]),
+                ("roughnessFactor", vec![pbr.roughness_factor()]),
+            ],
+        };
+        for (name, values) in factors {
+            if values.iter().all(|value| (-ROUNDING..=1.0 + ROUNDING).contains(value)) {
+                continue;
+            }
+            let message = format!("{name}: expected 0 to 1, found {values:?}");
+            self.log.warn("out_of_range", pointer, message, "clamped it; it does not count as stated");
+            match name {
+                "baseColorFactor" => stated.base_color = false,
+                // The conversion makes both of both colours.
+                "diffuseFactor" | "specularFactor" => (stated.base_color, stated.metallic) = (false, false),
+                "metallicFactor" => stated.metallic = false,
+                _ => stated.roughness = false,
+            }
+        }
+        stated
+    }
+
     fn model(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> MaterialModel {
         let (base_color, [roughness, metallic]) = match material.pbr_specular_glossiness() {
             Some(extension) => {
@@ -149,12 +205,12 @@ impl Reader<'_> {
         pointer: &str,
     ) -> (ColorInput, [ScalarInput; 2]) {
         let pbr = material.pbr_metallic_roughness();
-        let [red, green, blue, _] = pbr.base_color_factor();
+        let [red, green, blue, _] = pbr.base_color_factor().map(|factor| factor.clamp(0.0, 1.0));
         let base_color = match &lookups.base_color {
             Some(lookup) => self.color(lookup, [red, green, blue]),
             None => ColorInput::Constant([red, green, blue]),
         };
-        let factors = [pbr.roughness_factor(), pbr.metallic_factor()];
+        let factors = [pbr.roughness_factor(), pbr.metallic_factor()].map(|factor| factor.clamp(0.0, 1.0));
         let numbers = match &lookups.metallic_roughness {
             Some(lookup) if Some(lookup.set) == lookups.set() => {
                 [self.scalar(lookup, 1, factors[0]), self.scalar(lookup, 2, factors[1])]

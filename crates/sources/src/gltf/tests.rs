@@ -643,3 +643,56 @@ fn gpu_instances_are_placed() {
     assert!((turned.area() * 4.0 - large.area()).abs() < 1e-5);
     assert!(large.positions.iter().all(|place| place.x > 4.0 - 1e-5));
 }
+
+/// A tile 5 mm before a wall, 571 km from the origin: 32 bits are 31 mm apart there.
+#[test]
+fn nodes_that_each_lie_far_keep_their_distance() {
+    let matrix = |z: f64| json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 448231.137, 120.271, z, 1]);
+    for by_matrix in [false, true] {
+        let node = |name: &str, z: f64| match by_matrix {
+            true => json!({ "name": name, "mesh": 0, "matrix": matrix(z) }),
+            false => json!({ "name": name, "mesh": 0, "translation": [448231.137, 120.271, z] }),
+        };
+        let mut file = triangle();
+        file["nodes"] = json!([node("wall", -354123.613), node("tile", -354123.608),
+            { "camera": 0, "translation": [448231.137, 120.271, -354120.613] }]);
+        file["scenes"] = json!([{ "nodes": [0, 1, 2] }]);
+        file["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }]);
+        let scene = read_json(&file);
+        let z = |at: usize| scene.scene.surfaces[at].mesh.positions[0].z;
+        assert!((z(1) - z(0) - 0.005).abs() < 1e-6, "{} {}", z(0), z(1));
+        let distance = scene.camera.unwrap().position() - scene.scene.surfaces[0].mesh.positions[0].as_dvec3();
+        assert!((distance - DVec3::new(0.0, 0.0, 3.0)).length() < 1e-6, "{distance}");
+    }
+}
+
+#[test]
+fn a_projection_leaves_its_node_out_and_noise_does_not() {
+    let row = |a: f64, w: f64| json!([1, 0, 0, a, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, w]);
+    let with_row = |a: f64, w: f64| read_json(&with("/nodes/0/matrix", row(a, w)));
+    for (a, w) in [(0.2, 1.0), (0.0, 1.5), (1e-5, 1.0)] {
+        let scene = with_row(a, w);
+        let is_named = scene.findings.iter().any(|found| found.code == "bad_transform" && found.place == "/nodes/0");
+        assert!(is_named && scene.scene.surfaces.is_empty());
+    }
+    let scene = with_row(-5.9e-8, 1.0000001);
+    assert_eq!(scene.scene.surfaces[0].mesh.positions, read_json(&triangle()).scene.surfaces[0].mesh.positions);
+}
+
+#[test]
+fn colours_that_may_be_baked_to_emission_are_named() {
+    let emitting = |pbr: Value| {
+        let folder = tempfile::tempdir().unwrap();
+        png_io::write_rgb_bytes(&folder.path().join("t.png"), &Picture::filled(2, 2, [200, 60, 40])).unwrap();
+        let mut file = with(
+            "/materials/0",
+            json!({ "pbrMetallicRoughness": pbr, "emissiveFactor": [1, 1, 1],
+            "emissiveTexture": { "index": 0 } }),
+        );
+        (file["textures"], file["images"]) = (json!([{ "source": 0 }]), json!([{ "uri": "t.png" }]));
+        let scene = read_bytes_in(folder.path(), file.to_string().as_bytes()).unwrap();
+        scene.findings.iter().any(|found| found.code == "only_emission")
+    };
+    assert!(emitting(json!({})) && emitting(json!({ "baseColorFactor": [0, 0, 0, 1] })));
+    assert!(!emitting(json!({ "baseColorFactor": [0.5, 0.5, 0.5, 1] })));
+}
