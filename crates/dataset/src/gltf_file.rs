@@ -164,7 +164,9 @@ fn take_textures_without_picture(file: &mut Value) -> Result<Vec<String>, GltfEr
             format!("its only picture is KTX2 ({KTX2}), which is not read; {way_out}")
         } else {
             let name = shortened(name);
-            format!("its only picture is that of the extension '{name}', which is not read; convert the pictures to PNG")
+            format!(
+                "its only picture is that of the extension '{name}', which is not read; convert the pictures to PNG"
+            )
         };
         return Err(GltfError(format!("/textures/{at}: {what}")));
     }

@@ -12,6 +12,8 @@
 
 pub mod bitterli;
 mod coincident;
+#[cfg(test)]
+mod fallbacks;
 pub mod front3d;
 pub mod gltf;
 mod log;

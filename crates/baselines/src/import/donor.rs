@@ -202,7 +202,9 @@ impl Donor {
         let material = glowing.unwrap_or(&self.materials[self.triangles[0].material]);
         let advice = match material.glow {
             Glow::None => ": bake it to a texture, or state baseColorFactor or COLOR_0",
-            _ => ", which emits over black or white: baked colours belong into the base colour (baseColorTexture, map_Kd)",
+            _ => {
+                ", which emits over black or white: baked colours belong into the base colour (baseColorTexture, map_Kd)"
+            }
         };
         let name = shortened(&material.name);
         Err(ImportError::Invalid(format!("no material states a base colour, such as '{name}'{advice}")))

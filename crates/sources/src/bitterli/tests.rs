@@ -37,7 +37,7 @@ pub(crate) fn read_xml(xml: &str) -> Result<FileScene, SourceError> {
 }
 
 /// A scene of version 0.6 with a sensor and `inner`.
-fn read_inner(inner: &str) -> FileScene {
+pub(crate) fn read_inner(inner: &str) -> FileScene {
     read_xml(&format!("<scene version='0.6.0'>{SENSOR}{inner}</scene>")).unwrap()
 }
 
@@ -114,7 +114,9 @@ fn folders_are_searched_in_mitsubas_order() {
         read(&folder.path().join("scene.xml"), None, &Limits::default()).unwrap()
     };
     let at = |z: f64| format!("v 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nf 1 2 3\n");
-    [("t.obj", 1.0), ("a/t.obj", 2.0), ("b/t.obj", 3.0)].map(|(name, z)| write(name, &at(z)));
+    for (name, z) in [("t.obj", 1.0), ("a/t.obj", 2.0), ("b/t.obj", 3.0)] {
+        write(name, &at(z));
+    }
     let shape = "<shape type='obj'><string name='filename' value='t.obj'/></shape>";
     let found = |paths: &str| read_with(&format!("{paths}{shape}")).scene.surfaces[0].mesh.positions[0].z;
     assert_eq!(found(""), 1.0);

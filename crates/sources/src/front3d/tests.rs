@@ -201,3 +201,23 @@ fn lone_house(folder: &Path, text: &[u8]) -> HouseFiles {
         appearance: AppearanceRule::Constant,
     }
 }
+
+/// The codes of the findings of a small house, in which the value at a JSON pointer is replaced.
+pub(crate) fn house_findings(pointer: &str, value: Value) -> Vec<String> {
+    let mut house = json!({
+        "uid": "small",
+        "material": [{ "uid": "m", "color": [200, 100, 50], "UVTransform": [1, 0, 0, 0, 1, 0, 0, 0, 1] }],
+        "mesh": [{
+            "uid": "wall", "type": "WallInner", "material": "m", "xyz": [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0],
+            "uv": [0, 0, 1, 0, 1, 1, 0, 1], "normal": [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1], "faces": [0, 1, 2, 0, 2, 3]
+        }],
+        "scene": { "room": [{
+            "instanceid": "Room-1", "type": "Room",
+            "children": [{ "ref": "wall", "instanceid": "mesh/1", "pos": [0, 0, 0], "rot": [0, 0, 0, 1], "scale": [1, 1, 1] }]
+        }] }
+    });
+    *house.pointer_mut(pointer).expect("the pointer exists") = value;
+    let mut log = crate::log::Log::new("house.json".to_owned(), 100);
+    house::read(&house, "small", &Limits::default(), &mut log).unwrap();
+    log.into_findings().into_iter().map(|finding| finding.code).collect()
+}

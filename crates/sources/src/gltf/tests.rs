@@ -47,7 +47,7 @@ fn triangle() -> Value {
 }
 
 /// [`triangle`] with the value at a JSON pointer set. A missing key is added; `-` appends to a list.
-fn with(pointer: &str, value: Value) -> Value {
+pub(crate) fn with(pointer: &str, value: Value) -> Value {
     changed(triangle(), pointer, value)
 }
 
@@ -79,7 +79,7 @@ fn read_bytes(bytes: &[u8]) -> Result<FileScene, SourceError> {
     read_bytes_in(tempfile::tempdir().unwrap().path(), bytes)
 }
 
-fn read_json(file: &Value) -> FileScene {
+pub(crate) fn read_json(file: &Value) -> FileScene {
     read_bytes(file.to_string().as_bytes()).unwrap()
 }
 
