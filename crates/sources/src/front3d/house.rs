@@ -335,12 +335,7 @@ fn meshes(
             let message = format!("no material has the uid '{}'", shortened(&named));
             log.warn("no_material", &format!("{place}/material"), message, "used mid-grey");
         }
-        let kind = text(record, "type").unwrap_or_else(|| {
-            let message = "expected a type, as in WallInner, found none";
-            log.note("no_type", &place, message, "took it for architecture that gives no light");
-            "Other"
-        });
-        let kind = kind.to_owned();
+        let kind = text(record, "type").unwrap_or("Other").to_owned();
         meshes.push(HouseMesh { uid, kind, mesh, base, material, place });
     }
     Ok(meshes)
