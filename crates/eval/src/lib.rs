@@ -3,18 +3,18 @@
 //! In: a dataset with its ground truth, a submission, the weights of LPIPS. Out: [`result::ResultFile`], or, from
 //! [`verify`], whether a result states what the submission scores.
 //!
-//! [`metric`] is the table of metrics; [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those
-//! that they may not. For each
-//! [`scene`] of the dataset ([`open_scene`]), [`score()`](score::score) reads the submissions' maps
-//! ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
+//! [`metric`] is the table of metrics; [`protocol`] holds the constants that protocols may change, [`fixed_rules`]
+//! those that they may not. For each [`scene`] of the dataset ([`open_scene`]), [`score()`](score::score) reads the
+//! submissions' maps ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
 //!
-//! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]), removes their scale, and compares the
-//!    pictures with the [`truth`]'s.
-//! 2. [`light`] renders the maps under every light and compares the renders with R, the scorer's own render of the true maps
-//!    ([`light::reference`]). The true maps travel along the paths of every prediction (`light::paths`, [`light::predictions`]), so that what
-//!    few paths miss or exaggerate of both cancels: [`light::difference`] turns four quarters into two estimates of the encoded
-//!    difference from R, which are exactly zero for the true maps, and [`light::error`] states their noise. Protocol `paper`
-//!    compares with the photo's renderer instead ([`light::fitted`]).
+//! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]), removes their scale, and compares
+//!    the pictures with the [`truth`]'s.
+//! 2. [`light`] renders the maps under every light and compares the renders with R, the scorer's own render of the true
+//!    maps ([`light::reference`]). The true maps travel along the paths of every prediction (`light::paths`,
+//!    [`light::predictions`]), so that what few paths miss or exaggerate of both cancels: [`light::difference`] turns
+//!    four quarters into two estimates of the encoded difference from R, which are exactly zero for the true maps, and
+//!    [`light::error`] states their noise. Protocol `paper` compares with the photo's renderer instead
+//!    ([`light::fitted`]).
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means

@@ -11,7 +11,6 @@ use mateval_metrics::{Lpips, MetricError, Net, delta_e, flip, mae};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The better direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
@@ -82,7 +81,6 @@ pub enum Stated {
 pub struct MetricRow {
     pub style: NumberStyle,
     pub better: Better,
-    /// The pictures that it compares.
     pub of: &'static [&'static [PictureKind]],
     pub measure: Measure,
     pub stated: Stated,
@@ -200,7 +198,6 @@ metrics! {
     };
 }
 
-/// The network of [`Metric::LpipsAlex`].
 pub const LPIPS_NET: Net = Net::Alex;
 
 /// A difference of roughness or metallic of at most this counts as none: half a byte's step, which no file of bytes can

@@ -130,7 +130,6 @@ pub enum Track {
 }
 
 impl Track {
-    /// The kind of its pictures.
     pub fn picture(self) -> PictureKind {
         match self {
             Self::Fitted => PictureKind::RgbFitted,
@@ -140,7 +139,6 @@ impl Track {
     }
 }
 
-/// How predictions are rendered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightRules {

@@ -91,9 +91,10 @@ fn other_radiance(bytes: &[u8]) -> Option<String> {
     let stated = |key: &str| {
         let lines = header.lines().filter_map(|line| line.strip_prefix(key)?.trim_start().strip_prefix('='));
         let numbers = |text: &str| text.split_whitespace().map_while(|word| word.parse().ok()).collect::<Vec<f64>>();
-        lines.map(|text| numbers(text)).collect::<Vec<_>>()
+        lines.map(numbers).collect::<Vec<_>>()
     };
-    let differs = |found: f64, expected: f64, by: f64| !((found - expected).abs() <= by);
+    // What is no number differs.
+    let differs = |found: f64, expected: f64, by: f64| (found - expected).abs() > by || found.is_nan();
     let exposure: f64 = stated("EXPOSURE").iter().flatten().product();
     if differs(exposure, 1.0, 1e-3) {
         return Some(format!(

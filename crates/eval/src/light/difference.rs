@@ -30,7 +30,6 @@ use mateval_tracer::noise_filter::{Surfaces, filtered_mean};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The constants of the formulas.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DifferenceRules {
@@ -38,17 +37,13 @@ pub struct DifferenceRules {
     pub ratio_offset: f32,
     /// The largest ratio r of base colours.
     pub most_ratio: f32,
-    /// The largest b.
     pub most_control: f32,
-    /// The largest g.
     pub most_guide: f32,
-    /// The range of k.
     pub scale_range: [f64; 2],
     /// The pivot lies between k r R divided by this and k r R times this.
     pub pivot_factor: f64,
 }
 
-/// The constants of every protocol.
 pub const DIFFERENCE: DifferenceRules = DifferenceRules {
     ratio_offset: 1e-3,
     most_ratio: 8.0,

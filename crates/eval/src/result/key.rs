@@ -105,7 +105,6 @@ const fn psnr(kind: PictureKind, views: Views) -> ResultKey {
     ResultKey::whole(kind, views, Metric::Psnr)
 }
 
-/// The headline numbers of `mateval-3`.
 pub const HEADLINE: [ResultKey; 8] = [
     psnr(PictureKind::Albedo, Views::Novel),
     psnr(PictureKind::RgbTrue, Views::Novel),
@@ -117,7 +116,6 @@ pub const HEADLINE: [ResultKey; 8] = [
     ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::LpipsAlex),
 ];
 
-/// The headline numbers of `paper`.
 pub const PAPER_HEADLINE: [ResultKey; 4] = [
     psnr(PictureKind::RgbFitted, Views::Input),
     psnr(PictureKind::RgbFitted, Views::Novel),

@@ -8,7 +8,9 @@ use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::ResultKey;
-use mateval_image::{LinearRgb, Picture};
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{LinearRgb, Picture, Wrap};
 use mateval_testkit::kept_folder;
 
 use super::sample::{hasty, lpips, plan, scored, write_changed, write_grey, write_truth};
@@ -25,22 +27,32 @@ fn results(submissions: &[&Path], protocol: &Protocol, scenes: &[&str]) -> Vec<P
     results.map(|mut result| result.protocols.remove("mateval-3").unwrap()).collect()
 }
 
-/// No path is traced for a copy of the truth. A texel in the corner of every atlas, which no chart covers, makes the other
-/// submission another one: its paths are traced, and the difference is zero all the same.
+/// Writes the truth with its base colours as floats: the same values at every lookup, and other texels in memory.
+fn write_floats(out: &Path) {
+    write_truth(out);
+    let below = |folder: PathBuf| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut count = 0;
+    for instance in below(out.join("scenes")).flat_map(below) {
+        let path = instance.join("base_color.png");
+        let texture = read_texture(&path, Encoding::Srgb, Wrap::Clamp).unwrap();
+        let picture = Picture::from_fn(texture.width(), texture.height(), |x, y| LinearRgb(texture.texel(x, y)));
+        exr_io::write_linear(&path.with_extension("exr"), &picture, Precision::Float).unwrap();
+        std::fs::remove_file(path).unwrap();
+        count += 1;
+    }
+    assert!(count > 10, "{count}");
+}
+
+/// For a copy of the truth no path is traced. The truth as floats is another submission for the scorer, so that its paths
+/// are traced, and the difference is zero all the same.
 #[test]
 fn the_truth_is_exact_at_any_number_of_samples() {
-    let [truth, corners] = ["gt", "corners"].map(|name| kept_folder("exact").join(name));
+    let [truth, floats] = ["gt", "floats"].map(|name| kept_folder("exact").join(name));
     write_truth(&truth);
-    write_changed(&corners, |truth| {
-        let corner = [truth.width() - 1, truth.height() - 1];
-        let inverted = |LinearRgb(rgb): LinearRgb| LinearRgb(rgb.map(|v| 1.0 - v));
-        Picture::from_fn(truth.width(), truth.height(), |x, y| {
-            if [x, y] == corner { inverted(truth.get(x, y)) } else { truth.get(x, y) }
-        })
-    });
+    write_floats(&floats);
     let lpips = lpips();
     for each_half in [2, 6] {
-        let mut plan = plan(&[&truth, &corners], &samples(each_half, "other"), &[]);
+        let mut plan = plan(&[&truth, &floats], &samples(each_half, "other"), &[]);
         if let Some(lpips) = &lpips {
             let again = mateval_metrics::Lpips::load(
                 lpips.net(),

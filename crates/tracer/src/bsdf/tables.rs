@@ -90,10 +90,8 @@ impl Known {
 /// Fails unless every constant is finite, every index of refraction above 0, and every texture and channel exist.
 fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
     let inputs = material.model.inputs();
-    if let Some(eta) = inputs.eta {
-        if !(eta.is_finite() && eta > 0.0) {
-            return Err(MaterialFault::IndexOfRefraction(eta));
-        }
+    if let Some(eta) = inputs.eta.filter(|eta| !(eta.is_finite() && *eta > 0.0)) {
+        return Err(MaterialFault::IndexOfRefraction(eta));
     }
     inputs.colors.iter().try_for_each(|color| check_color(color, textures))?;
     inputs.scalars.iter().try_for_each(|scalar| check_scalar(scalar, textures))?;
