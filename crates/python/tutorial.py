@@ -107,4 +107,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except mateval.Error as error:
+        raise SystemExit(f"error: {error}") from None

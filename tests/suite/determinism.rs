@@ -71,6 +71,7 @@ fn another_recipe_and_other_samples_give_another_manifest() {
     assert_ne!(depth(&manifest(&dataset)), depth(&manifest(sample::dataset())));
 
     let copy = sample::copied_dataset();
-    run(&mut render(copy.path(), 2)).ends_with(0);
+    run(&mut render(copy.path(), 2)).ends_with(2).says("or --force to replace them");
+    run(render(copy.path(), 2).arg("--force")).ends_with(0);
     assert_ne!(manifest(copy.path()), manifest(sample::dataset()));
 }

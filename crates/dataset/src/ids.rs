@@ -46,7 +46,7 @@ macro_rules! id_type {
         pub struct $name(String);
 
         impl $name {
-            /// Checks the text against [`ID_PATTERN`].
+            /// Checks the text against the pattern of ids.
             pub fn new(text: impl Into<String>) -> Result<Self, BadId> {
                 let text = text.into();
                 if is_id(&text) { Ok(Self(text)) } else { Err(BadId(text)) }

@@ -14,7 +14,7 @@ use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::material::MaterialClassesFile;
-use mateval_dataset::open::{absent_scenes, is_below};
+use mateval_dataset::open::{absent_scenes, is_below, read_dataset_file};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
 use mateval_files::untrusted::sha256_of_file;
 use mateval_tracer::World;
@@ -28,10 +28,8 @@ use crate::error::PrepError;
 pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepError> {
     let dataset_path = root.join(DATASET);
     if !dataset_path.is_file() {
-        return Err(PrepError::unusable(
-            root,
-            "has no dataset.json: it is not a dataset, or its build did not finish and `prep build` must be run again",
-        ));
+        // Its error names what is there instead.
+        read_dataset_file(root)?;
     }
     let mut faults = Faults::default();
     progress(Report::step("hashes", 0, 1));
