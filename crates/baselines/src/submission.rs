@@ -37,7 +37,7 @@ pub struct Baseline {
     pub name: &'static str,
     /// A line for the command's help.
     pub about: &'static str,
-    /// Writes the submission to a folder, or, if told so, over an earlier one; returns the number of instances.
+    /// Writes the submission to a folder and returns the number of instances. With `force` it replaces an earlier one.
     pub write: fn(&Dataset, &Path, bool) -> Result<usize, BaselineError>,
 }
 

@@ -56,7 +56,7 @@ enum Command {
     Fetch(fetch::FetchArgs),
     /// Prints the completions of a shell: `mateval completions bash > ~/.local/share/bash-completion/completions/mateval`.
     Completions {
-        /// The shell.
+        /// The shell that reads the script.
         shell: Shell,
     },
 }

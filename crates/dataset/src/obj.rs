@@ -25,7 +25,7 @@ pub struct ObjLimits {
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[error("{}{fault}", line.map_or(String::new(), |line| format!("line {line}: ")))]
 pub struct ObjError {
-    /// The line, from 1; none where no single line is to blame.
+    /// The line, from 1; absent if no single line is to blame.
     pub line: Option<usize>,
     /// What was expected and what was found.
     pub fault: ObjFault,

@@ -141,7 +141,7 @@ pub fn enclosing_dataset(path: &Path) -> Option<PathBuf> {
     above.ancestors().find(is_dataset).map(Path::to_owned)
 }
 
-/// Reads `dataset.json` of the dataset in `root`. Fails with what is there instead of a dataset.
+/// Reads `dataset.json` of the dataset in `root`. The error for another folder names what was found.
 pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, SceneError> {
     let path = root.join(DATASET);
     if path.is_file() {

@@ -295,7 +295,7 @@ pub fn write_source_materials(folder: &SceneFolder, source: &SourceMaterials) ->
     json::write(&place.join(SOURCE_MATERIALS), &file)
 }
 
-/// Reads the files of [`write_source_materials`]; none where the scene has none. Every index out of range is a finding
+/// Reads the files of [`write_source_materials`]; absent if the scene has none. Every index out of range is a finding
 /// of the error; `count` is the number of the scene's materials.
 pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Option<SourceMaterials>, SceneError> {
     let place = folder.source_materials();

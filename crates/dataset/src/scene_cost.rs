@@ -126,7 +126,7 @@ const STAT: &str = "/proc/self/stat";
 /// The places of `utime`, `stime`, `cutime` and `cstime` behind the program's name.
 const TIMES: std::ops::Range<usize> = 11..15;
 
-/// The processor time used so far, of all threads and of child processes that have ended; none where the system does
+/// The processor time used so far, of all threads and of child processes that have ended; absent if the system does
 /// not state it.
 pub fn processor_time() -> Option<Duration> {
     let ticks = ticks(&std::fs::read_to_string(STAT).ok()?)?;

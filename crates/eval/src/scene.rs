@@ -69,7 +69,7 @@ pub(crate) struct MaskedRegion {
 }
 
 impl SceneTask<'_> {
-    /// The same task over one set of its views; none where the set is empty.
+    /// The same task over one set of its views; absent if the set is empty.
     pub(crate) fn of(&self, set: ViewSet) -> Option<Self> {
         let views = set.of(&self.views);
         (!views.is_empty()).then(|| Self { views, set, ..self.clone() })

@@ -74,7 +74,7 @@ fn points(cameras: &[Camera], depths: &[Picture<f32>], colors: &Picture<[u8; 3]>
     points
 }
 
-/// The place of a point in a view's picture; none where the view does not show it.
+/// The place of a point in a view's picture; absent if the view does not show it.
 fn place(camera: &Camera, depth: &Picture<f32>, world: DVec3) -> Option<DVec2> {
     let (pixel, distance) = camera.project(world)?;
     let inside = pixel.min_element() >= 0.0 && pixel.x < depth.width() as f64 && pixel.y < depth.height() as f64;

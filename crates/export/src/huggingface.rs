@@ -160,7 +160,7 @@ message views {
 pub struct Row {
     pub scene: String,
     pub view: String,
-    /// The bytes of its PNG file; none where it is withheld.
+    /// The bytes of its PNG file; absent if it is withheld.
     pub picture: Option<Vec<u8>>,
     pub camera: Camera,
     /// The licence of its scene.

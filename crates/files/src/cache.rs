@@ -48,7 +48,7 @@ impl Cache {
         self.folder.join(&key.0)
     }
 
-    /// An entry of at most `most_bytes`; none where it was not kept.
+    /// An entry of at most `most_bytes`; absent if it was not kept.
     pub fn read(&self, key: &Key, most_bytes: u64) -> io::Result<Option<Vec<u8>>> {
         let path = self.path(key);
         match read_at_most(&path, most_bytes) {

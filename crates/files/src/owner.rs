@@ -36,14 +36,14 @@ impl Owner {
         Self { host: HOST.clone(), process: std::process::id(), start: *START }
     }
 
-    /// Reads an owner's text; none where it is not one.
+    /// Reads an owner's text; absent if it is not one.
     pub fn parse(text: &str) -> Option<Self> {
         let [host, process, start] = <[&str; 3]>::try_from(text.split('-').collect::<Vec<_>>()).ok()?;
         let start = u64::from_str_radix(start, 16).ok()?;
         Some(Self { host: host.to_owned(), process: process.parse().ok()?, start })
     }
 
-    /// Whether the process has ended; none where it runs on another host, since only that one knows.
+    /// Whether the process has ended; absent if it runs on another host, since only that one knows.
     pub fn is_gone(&self) -> Option<bool> {
         if self.host != *HOST {
             return None;

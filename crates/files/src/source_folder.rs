@@ -204,7 +204,7 @@ fn stays_inside(path: &Path) -> bool {
     depth.is_some()
 }
 
-/// The deepest folder that contains all of these, with links resolved; none where that is the root or a path is
+/// The deepest folder that contains all of these, with links resolved; absent if that is the root or a path is
 /// missing.
 pub fn common_folder<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<PathBuf> {
     let mut common: Option<PathBuf> = None;

@@ -34,7 +34,7 @@ const GONE_AFTER: Duration = Duration::from_secs(24 * 3600);
 
 const ENDING: &str = ".partial";
 
-/// A name beside `place` that no other process and no other call uses; none where `place` has no name, as in `.`.
+/// A name beside `place` that no other process and no other call uses; absent if `place` has no name, as in `.`.
 pub fn beside(place: &Path) -> Option<PathBuf> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let mut name = prefix(place)?;

@@ -158,7 +158,7 @@ impl LitRoom<'_> {
         extent
     }
 
-    /// The height of the level ceiling above `place`; none where `place` is hidden from the centre or has no such
+    /// The height of the level ceiling above `place`; absent if `place` is hidden from the centre or has no such
     /// ceiling.
     fn ceiling_above(&self, place: DVec3) -> Option<f64> {
         if !self.sees(place) {

@@ -45,7 +45,7 @@ pub struct GeometryPictures {
     pub normal: Picture<Normal>,
     /// Instance index at pixel centres; 0 where the ray hits no surface.
     pub instance: Picture<u16>,
-    /// The triangle at pixel centres; none where the ray hits no surface.
+    /// The triangle at pixel centres; absent if the ray hits no surface.
     pub triangle: Picture<Option<SeenTriangle>>,
     /// Pixels whose centre and every sub-pixel show a scored surface, and not through one of fractional opacity.
     pub valid: Mask,

@@ -60,9 +60,9 @@ words! {
 /// One fault. Findings sort by line, element, code and message.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Finding {
-    /// The line, from 1; none where the fault concerns the whole file.
+    /// The line, from 1; absent if the fault concerns the whole file.
     pub line: Option<usize>,
-    /// The element, as in `noise2d 'grain'`; none where the fault concerns no element.
+    /// The element, as in `noise2d 'grain'`; absent if the fault concerns no element.
     pub element: Option<String>,
     pub code: Code,
     /// What was expected and what was found.

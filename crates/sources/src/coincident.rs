@@ -67,7 +67,7 @@ pub(crate) fn separate(surfaces: &mut [Surface], origins: &mut [InstanceOrigin],
     }
 }
 
-/// Moves the sheets of architecture. Returns the layer of each face; none where there are too many pairs.
+/// Moves the sheets of architecture. Returns the layer of each face; absent if there are too many pairs.
 fn layered(faces: &[Face], place: &str, log: &mut Log, shifts: &mut Shifts) -> Option<Vec<usize>> {
     let (pairs, is_whole) = near_pairs(faces, COINCIDENT_M);
     if !is_whole {
@@ -148,7 +148,7 @@ fn raise(
     is_whole
 }
 
-/// The shift that takes each face of furniture in front of all architecture that it touches, by its index; none where
+/// The shift that takes each face of furniture in front of all architecture that it touches, by its index; absent if
 /// there are too many pairs.
 fn wanted_shifts(
     surfaces: &[Surface],

@@ -295,7 +295,7 @@ impl Polygon {
         polygon
     }
 
-    /// Its corners in order; none where everything was cut off.
+    /// Its corners in order; absent if everything was cut off.
     fn corners(&self) -> &[DVec2] {
         &self.corners[..self.count]
     }

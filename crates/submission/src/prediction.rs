@@ -248,7 +248,7 @@ impl MemoryBudget {
         Self { bytes_left: MAX_SCENE_BYTES }
     }
 
-    /// Gives the texture back and counts its texels; none where they exceed the budget.
+    /// Gives the texture back and counts its texels; absent if they exceed the budget.
     pub(crate) fn holding(&mut self, texture: Texture) -> Option<Texture> {
         self.bytes_left = self.bytes_left.checked_sub(texture.bytes().len())?;
         Some(texture)

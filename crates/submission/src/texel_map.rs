@@ -23,7 +23,7 @@ pub const LEAST_COSINE: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTexel {
     pub column: usize,
-    /// The uv of the place that represents it; none where that is its centre.
+    /// The uv of the place that represents it; absent if that is its centre.
     pub off_centre: Option<[f32; 2]>,
     /// Its area on the surface, in square metres.
     pub area_m2: f64,

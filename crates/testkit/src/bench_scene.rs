@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use crate::shared_data;
 
-/// The folder of `bench/<name>`; none where the shared data are missing.
+/// The folder of `bench/<name>`; absent if the shared data are missing.
 pub fn folder(name: &str) -> Option<PathBuf> {
     let scene = shared_data(&format!("bench/{name}/scene.json"))?;
     scene.parent().map(Path::to_owned)

@@ -68,7 +68,7 @@ impl<'a> PhotoCache<'a> {
         Ok(Self { camera, projection: camera.projection(), photo, valid, shown })
     }
 
-    /// The radiance that leaves `place` towards `wo`, as if it left in all directions alike; none where the photo does
+    /// The radiance that leaves `place` towards `wo`, as if it left in all directions alike; absent if the photo does
     /// not show that side of the place.
     pub fn radiance(&self, place: &SurfaceHit, wo: Vec3) -> Option<Vec3> {
         let position = place.position.as_dvec3();

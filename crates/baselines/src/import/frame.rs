@@ -19,7 +19,7 @@ use super::report::ImportedFrame;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     pub report: ImportedFrame,
-    /// The map from the mesh's space to the world; none where the mesh is used as it is.
+    /// The map from the mesh's space to the world; absent if the mesh is used as it is.
     world_from_donor: Option<Similarity>,
 }
 
@@ -73,7 +73,7 @@ impl Located {
     }
 }
 
-/// The order of axes that fits most of the meshes, of equal ones the preferred; none where no mesh was moved by one. A
+/// The order of axes that fits most of the meshes, of equal ones the preferred; absent if no mesh was moved by one. A
 /// generator treats all meshes alike, so this decides the turn of symmetric meshes.
 pub fn preferred_order<'a>(meshes: impl Iterator<Item = &'a Located>) -> Option<usize> {
     let mut votes: BTreeMap<usize, usize> = BTreeMap::new();
@@ -179,7 +179,7 @@ pub enum Search {
     InPlace,
     /// Similarities that explain the mesh equally well, in the order in which they are preferred.
     Moved(Vec<Fit>),
-    /// No similarity explains the mesh. Holds the smallest residual that was found, in metres; none where no box has
+    /// No similarity explains the mesh. Holds the smallest residual that was found, in metres; absent if no box has
     /// the right proportions.
     Unexplained(Option<f64>),
 }
@@ -307,7 +307,7 @@ fn of_triangles(target: &[[DVec3; 3]], donor: &[[DVec3; 3]], limit_m: f64) -> Op
     (error_m <= limit_m).then_some(similarity)
 }
 
-/// The similarity with this order of axes that maps the donor's box to the target's; none where their proportions
+/// The similarity with this order of axes that maps the donor's box to the target's; absent if their proportions
 /// differ.
 fn of_boxes(target: &Shape, donor: &Shape, rotation: DMat3, limit_m: f64) -> Option<Similarity> {
     let scale = target.longest() / donor.longest();

@@ -24,7 +24,7 @@ pub struct Rebaked {
     pub atlas: PartialAtlas,
     /// Distances to all places that were used.
     pub distances: Distances,
-    /// Smallest distance between a texel and the donor, in metres; none where the donor has no triangles.
+    /// Smallest distance between a texel and the donor, in metres; absent if the donor has no triangles.
     pub nearest_m: Option<f64>,
 }
 

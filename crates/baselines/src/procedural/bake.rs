@@ -19,7 +19,7 @@ const TEXELS: usize = 4096;
 pub struct Baked {
     /// The maps, with filled gutters.
     pub maps: Maps,
-    /// Whether the input view shows each texel; none where seen texels are not kept.
+    /// Whether the input view shows each texel; absent if seen texels are not kept.
     pub seen: Option<Mask>,
 }
 

@@ -306,7 +306,7 @@ const PREDICTORS: usize = 16;
 const MOST_POINTS: usize = 1024;
 
 /// The mean square of the differences between held-out points and the mean of the points nearest to them that are not
-/// held out; none where there are none of either.
+/// held out; absent if there are none of either.
 fn interpolation_error(points: &[Point]) -> Option<f64> {
     let (seen, held_out) = split(points);
     if seen.is_empty() || held_out.is_empty() {

@@ -101,7 +101,7 @@ fn sample(frame: &PartFrame, camera: &Camera, point: &SeenPoint, values: Values)
     Some(Sample { pixel, chart, position: point.place, values, point: Point { u, v, footprint, albedo, weight: 1.0 } })
 }
 
-/// The root of the area that a pixel covers of a surface, in metres; none where it is seen at too steep an angle.
+/// The root of the area that a pixel covers of a surface, in metres; absent if it is seen at too steep an angle.
 fn footprint(camera: &Camera, place: DVec3, normal: DVec3) -> Option<f64> {
     let to_viewer = camera.position() - place;
     let (_, depth) = camera.projection().project(place)?;

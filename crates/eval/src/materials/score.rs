@@ -234,7 +234,7 @@ pub fn measure_albedo(
     Ok(())
 }
 
-/// MSE of an albedo picture over the mask, in the protocol's space; none where no pixel counts.
+/// MSE of an albedo picture over the mask, in the protocol's space; absent if no pixel counts.
 pub fn albedo_mse(
     protocol: &Protocol,
     prediction: &Albedo,

@@ -159,7 +159,7 @@ impl Lines {
     }
 }
 
-/// Resident memory of a process, in bytes; none where the system does not report it.
+/// Resident memory of a process, in bytes; absent if the system does not report it.
 fn resident_bytes(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -211,7 +211,7 @@ fn is_input_picture(path: &str) -> bool {
 }
 
 /// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no
-/// photo from elsewhere; none where none has, or where all scenes have one.
+/// photo from elsewhere; absent if none has, or where all scenes have one.
 fn photo_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
     let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
     let rendered: Vec<SceneId> = dataset.scenes.iter().filter(|id| !is_photographed(root, id)).cloned().collect();

@@ -29,7 +29,7 @@ pub(super) struct InstanceAtlas {
 pub(super) struct AtlasSizes<'a> {
     /// Texels a side, where the recipe states them. Otherwise a texel is at most half a pixel of the input view.
     pub(super) fixed: Option<u32>,
-    /// The depth at which each instance is seen in metres; none where no view shows it.
+    /// The depth at which each instance is seen in metres; absent if no view shows it.
     pub(super) nearest: &'a [Option<f64>],
 }
 

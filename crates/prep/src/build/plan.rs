@@ -129,7 +129,7 @@ pub(super) fn make_plan(
     Ok((plan, absent))
 }
 
-/// The classes of the source's own parts; none where its reader states none.
+/// The classes of the source's own parts; absent if its reader states none.
 fn classified_parts(own: &PartSplit, origins: &[InstanceOrigin]) -> Option<Vec<ClassifiedPart>> {
     let mut all = Vec::new();
     for (instance, origin) in own.instances.iter().zip(origins) {

@@ -99,7 +99,7 @@ fn finding(file: &str, place: &str, message: &str) -> Finding {
     )
 }
 
-/// The point in the middle of the input view at the median depth of ten by ten rays; none where no ray meets a surface.
+/// The point in the middle of the input view at the median depth of ten by ten rays; absent if no ray meets a surface.
 fn looked_at(world: &World, input: &Camera) -> Option<DVec3> {
     let mut depths: Vec<f64> = score_grid(&input.intrinsics)
         .filter_map(|place| hit_through(world, input, place))
@@ -110,7 +110,7 @@ fn looked_at(world: &World, input: &Camera) -> Option<DVec3> {
     Some(input.unproject(DVec2::new(input.intrinsics.cx, input.intrinsics.cy), depth))
 }
 
-/// A camera at `place` that looks at `target`; none where it would look straight up or down. What the input view does
+/// A camera at `place` that looks at `target`; absent if it would look straight up or down. What the input view does
 /// not see is counted when its pictures are made.
 fn looking_at(id: ViewId, place: DVec3, target: DVec3, input: &Camera) -> Option<View> {
     let camera = Camera::look_at(place, target, DVec3::Y, input.intrinsics)?;
@@ -149,7 +149,7 @@ impl<'a> Judge<'a> {
         judge
     }
 
-    /// The best of the places that are drawn at a distance; none where no place will do.
+    /// The best of the places that are drawn at a distance; absent if no place will do.
     fn draw(&self, seed: u64, number: u32, distance: f64) -> Option<DVec3> {
         let place = |draw: u32| {
             let [around, up, ..] = Sampler::new(seed, [number, 0], draw).set(0).map(f64::from);
@@ -168,7 +168,7 @@ impl<'a> Judge<'a> {
         best.map(|(_, place)| place)
     }
 
-    /// The share of the valid pixels that the input view does not show; none where a rule is broken, the cheapest
+    /// The share of the valid pixels that the input view does not show; absent if a rule is broken, the cheapest
     /// first.
     fn unseen_from(&self, place: DVec3) -> Option<f64> {
         let way = place - self.input.position();

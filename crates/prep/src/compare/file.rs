@@ -242,7 +242,7 @@ impl CompareFile {
 }
 
 impl ViewComparison {
-    /// The check of this quantity of this picture; none where it was not made.
+    /// The check of this quantity of this picture; absent if it was not made.
     pub fn check(&self, picture: &str, quantity: Quantity) -> Option<&Check> {
         self.checks.iter().find(|check| check.picture == picture && check.quantity == quantity)
     }

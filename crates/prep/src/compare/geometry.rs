@@ -21,7 +21,7 @@ pub(super) struct OurGeometry {
     pub(super) valid: Mask,
 }
 
-/// Blender's pictures of a view; none where a picture could not be read.
+/// Blender's pictures of a view; absent if a picture could not be read.
 #[derive(Default)]
 pub(super) struct TheirGeometry {
     pub(super) base_color: Option<Picture<LinearRgb>>,

@@ -133,7 +133,7 @@ fn verdict(file: &CompareFile) -> VerdictFile {
 /// The renderer whose pictures are compared with the built-in tracer's.
 const COMPARED: RendererKind = RendererKind::Blender;
 
-/// The folder of Blender's pictures of the view; none where they are missing or incomplete.
+/// The folder of Blender's pictures of the view; absent if they are missing or incomplete.
 fn rendered(folder: &SceneFolder, view: &View) -> Option<PathBuf> {
     let place = folder.render(&COMPARED.id(), &view.id);
     place.join(RENDER_FILE).is_file().then_some(place)
@@ -275,7 +275,7 @@ impl Pilot<'_> {
     }
 }
 
-/// Blender's pictures of the view; none where they are missing or incomplete.
+/// Blender's pictures of the view; absent if they are missing or incomplete.
 fn their_view(folder: &SceneFolder, view: &View) -> Option<TheirView> {
     rendered(folder, view).map(|folder| TheirView { folder, size: size(view) })
 }
@@ -341,7 +341,7 @@ impl ViewPair<'_> {
         all
     }
 
-    /// Compares one picture of light. Returns Blender's picture; none where it could not be read.
+    /// Compares one picture of light. Returns Blender's picture; absent if it could not be read.
     fn compare_light(
         &self,
         picture: &str,

@@ -26,7 +26,7 @@ use base_color::{BaseColorRule, DerivedTextures};
 pub struct Conversion {
     /// The scene; only its materials and their textures differ from the source's.
     pub scene: ReferenceScene,
-    /// The source's materials; none where all of them are of the scored model already.
+    /// The source's materials; absent if all of them are of the scored model already.
     pub source: Option<SourceMaterials>,
     /// What could be converted only approximately.
     pub findings: Vec<Finding>,

@@ -190,7 +190,7 @@ struct Drawing {
     subtitle: String,
     rows: Vec<Row>,
     columns: Vec<Column>,
-    /// Position of the histogram's axis; none where there is no histogram.
+    /// Position of the histogram's axis; absent if there is no histogram.
     axis_y: Option<String>,
 }
 

@@ -365,7 +365,7 @@ impl<'a> CameraDraws<'a> {
 /// A camera that is not offered, and why.
 #[derive(Clone, Debug, PartialEq)]
 struct RefusedCamera {
-    /// Where the camera comes from, as in `seed 3`; none where no camera can be drawn in the room at all.
+    /// Where the camera comes from, as in `seed 3`; absent if no camera can be drawn in the room at all.
     pub(super) origin: Option<String>,
     pub(super) why: CameraRefusal,
 }

@@ -70,7 +70,7 @@ fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-/// The shortest way that separates the pieces, in metres; none where they do not intersect.
+/// The shortest way that separates the pieces, in metres; absent if they do not intersect.
 fn depth(a: &Solid<'_>, b: &Solid<'_>) -> Option<f64> {
     if !boxes_overlap(a, b) || !(lies_partly_in(a, b) || lies_partly_in(b, a)) {
         return None;
@@ -194,7 +194,7 @@ impl<'a> Solid<'a> {
         pieces.filter(is_enclosed).collect()
     }
 
-    /// Where a ray enters and leaves the piece's box; none where it does not meet it.
+    /// Where a ray enters and leaves the piece's box; absent if it does not meet it.
     fn within_box(&self, from: Vec3, direction: Vec3, reach: f32) -> Option<[f32; 2]> {
         let [low, high] = self.bounds();
         let (mut enter, mut leave) = (0.0_f32, reach);
@@ -353,7 +353,7 @@ mod tests {
         mesh
     }
 
-    /// Depth and share of the two; none where they do not intersect.
+    /// Depth and share of the two; absent if they do not intersect.
     fn of(a: &TriangleMesh, b: &TriangleMesh) -> Option<[f64; 2]> {
         let found = intersections(&[a, b]).unwrap();
         assert!(found.len() <= 1 && found.iter().all(|found| found.pair == [0, 1]));

@@ -35,7 +35,7 @@ pub use survey_file::{
 
 #[derive(Clone, Debug)]
 pub struct Surveyed {
-    /// What was written as `survey.json`; none where only some houses were to be searched.
+    /// What was written as `survey.json`; absent if only some houses were to be searched.
     pub file: Option<SurveyFile>,
     /// The folder that its paths, and those of its recipe, are relative to.
     pub source: PathBuf,

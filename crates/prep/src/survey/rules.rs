@@ -214,7 +214,7 @@ impl RejectionLists {
         Ok(())
     }
 
-    /// The rejection of a listed id; none where the id is on no list.
+    /// The rejection of a listed id; absent if the id is on no list.
     pub(super) fn reason(&self, id: &str) -> Option<Rejection> {
         self.reasons.get(id).map(|reason| Rejection::new("listed", reason.clone()))
     }

@@ -28,7 +28,7 @@ use crate::error::PrepError;
 pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepError> {
     let dataset_path = root.join(DATASET);
     if !dataset_path.is_file() {
-        // Its error names what is there instead.
+        // Only for its error, which names what was found.
         read_dataset_file(root)?;
     }
     let mut faults = Faults::default();

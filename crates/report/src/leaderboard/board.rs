@@ -110,7 +110,7 @@ impl<'a> Board<'a> {
         columns::first(&self.columns, self.scores.first().map_or(&[][..], |scores| &scores.protocol.headline))
     }
 
-    /// The values of the method at place `at` for a scene, as tables show them; none where the scene has no such value.
+    /// The values of the method at place `at` for a scene, as tables show them; absent if the scene has no such value.
     pub(super) fn texts(&self, at: usize, scene: &SceneId, columns: &[&Column]) -> Vec<Option<String>> {
         let values = self.scores[at].scenes.get(scene);
         columns.iter().map(|column| Some(column.text(*values?.get(&column.key)?))).collect()

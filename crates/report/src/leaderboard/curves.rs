@@ -83,7 +83,7 @@ pub(super) fn write_perturbed(board: &Board<'_>, site: &SiteWriter<'_>) -> Resul
     })
 }
 
-/// The charts of one kind; none where no submission was made from such geometry.
+/// The charts of one kind; absent if no submission was made from such geometry.
 fn section(board: &Board<'_>, kind: PerturbationKind) -> Option<Section> {
     let mut stated = board.results.iter().filter_map(|result| result.submission.geometry);
     if !stated.any(|perturbation| perturbation.kind == kind) {

@@ -201,7 +201,7 @@ impl ReferenceScores {
         }
     }
 
-    /// The scores of one scene; none where it was not scored, or the ground truth is withheld.
+    /// The scores of one scene; absent if it was not scored, or the ground truth is withheld.
     pub fn of_scene(&self, scene: &SceneId) -> Option<&BTreeMap<ResultKey, f64>> {
         self.scenes.as_ref()?.get(scene)
     }

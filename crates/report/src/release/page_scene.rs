@@ -155,7 +155,7 @@ fn noise(file: &ReleaseFile, scene: &ReleasedScene) -> Cell {
     }
 }
 
-/// The PSNR of the noisiest view, in dB; none where no view has noise that is known.
+/// The PSNR of the noisiest view, in dB; absent if no view has noise that is known.
 pub(crate) fn worst_psnr(scene: &ReleasedScene) -> Option<f64> {
     let views = scene.noise.iter().flatten();
     views.filter_map(|view| view.mean_of_halves_psnr_db).min_by(f64::total_cmp)
@@ -175,7 +175,7 @@ fn cost(costs: &[StepCost]) -> Cell {
     }
 }
 
-/// The processor time of all steps, in seconds; none where that of a step is unknown, or no step was recorded.
+/// The processor time of all steps, in seconds; absent if that of a step is unknown, or no step was recorded.
 pub(crate) fn cpu_seconds(costs: &[StepCost]) -> Option<f64> {
     let seconds: Vec<f64> = costs.iter().map(|cost| cost.cpu_seconds).collect::<Option<_>>()?;
     (!seconds.is_empty()).then(|| seconds.iter().sum())

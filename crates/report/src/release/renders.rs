@@ -89,7 +89,7 @@ fn add(all: &mut Vec<RenderedWith>, scene: &SceneId, file: RenderFile) {
     }
 }
 
-/// The noise of a scene's views; none where the scene is not rendered.
+/// The noise of a scene's views; absent if the scene is not rendered.
 pub(crate) fn noise(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Vec<ViewNoise>>, ReportError> {
     let Some(renderer) = dataset.photo_renderer(scene) else { return Ok(None) };
     let mut views = Vec::new();
@@ -108,7 +108,7 @@ pub(crate) fn noise(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Vec<V
     Ok(Some(views))
 }
 
-/// The view's `render.json`; none where the renderer has not rendered it.
+/// The view's `render.json`; absent if the renderer has not rendered it.
 fn render_file(
     dataset: &Dataset,
     scene: &SceneFile,
@@ -140,7 +140,7 @@ pub struct Thumbnail {
     pub height: usize,
 }
 
-/// Writes the picture of a scene below `out`; none where the input view has not been rendered.
+/// Writes the picture of a scene below `out`; absent if the input view has not been rendered.
 pub(crate) fn write_thumbnail(
     dataset: &Dataset,
     scene: &SceneFile,

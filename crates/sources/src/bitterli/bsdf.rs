@@ -421,7 +421,7 @@ const DIELECTRICS: [(&str, f64); 24] = [
     ("glass", 1.5),
 ];
 
-/// The index of refraction of the dielectric `name`; none where it is unknown.
+/// The index of refraction of the dielectric `name`; absent if it is unknown.
 fn dielectric(name: &str) -> Option<f64> {
     let name = name.trim().to_ascii_lowercase();
     DIELECTRICS.iter().find(|(known, _)| *known == name).map(|(_, index)| *index)

@@ -661,7 +661,7 @@ const WORDS: [&str; 20] = [
     "<sensor type='thinlens'/>",
 ];
 
-/// The scene; none where the shared data are missing.
+/// The scene; absent if the shared data are missing.
 fn real(file: &str) -> Option<FileScene> {
     let path = shared_data(&format!("bitterli/{file}"))?;
     Some(read(&path, None, &Limits::default()).unwrap())

@@ -168,7 +168,7 @@ impl<'a> RoomSampler<'a> {
         Ok(FoundCamera { camera, score, nearest_m, mean_m, tries: 0 })
     }
 
-    /// The position at the drawn height above the floor below `above`; none where something else is below.
+    /// The position at the drawn height above the floor below `above`; absent if something else is below.
     fn on_own_floor(&self, above: DVec3, rules: &SamplerRules, height: f64) -> Option<DVec3> {
         let down = self.world.first_hit(&Ray::endless(above.as_vec3(), Vec3::NEG_Y))?;
         if !is_floor(self.house, down.surface.0, self.room) {

@@ -262,7 +262,7 @@ impl Furnisher<'_> {
         }
     }
 
-    /// The class of architecture of one material and type; none where classes are not asked for.
+    /// The class of architecture of one material and type; absent if classes are not asked for.
     fn architecture_finish(&self, material: Option<usize>, kind: &str, room: usize, parts: &[usize]) -> Option<Finish> {
         if self.appearances.rule == AppearanceRule::Constant {
             return None;

@@ -59,7 +59,7 @@ pub(crate) struct HouseMesh {
     pub mesh: TriangleMesh,
     /// What has been subtracted from the file's positions: whole metres far from the origin, else nothing.
     pub base: DVec3,
-    /// Index in [`House::materials`]; none where the file names no known material.
+    /// Index in [`House::materials`]; absent if the file names no known material.
     pub material: Option<usize>,
     /// JSON pointer to the record.
     pub place: String,
@@ -69,7 +69,7 @@ pub(crate) struct HouseMesh {
 pub(crate) struct HouseMaterial {
     /// The uid by which meshes refer to it.
     pub uid: String,
-    /// The name of its texture's folder; none where the colour counts.
+    /// The name of its texture's folder; absent if the colour counts.
     pub texture: Option<String>,
     /// The words of its content type, as in `material wallpaper`.
     pub content: Option<String>,
@@ -500,7 +500,7 @@ fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
     all.iter().enumerate().filter_map(camera).collect()
 }
 
-/// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; none where one of them is missing or
+/// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; absent if one of them is missing or
 /// faulty.
 fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     let (position, target) = (numbers::<3>(record, "pos")?, numbers::<3>(record, "target")?);

@@ -129,7 +129,7 @@ pub(super) struct Finish {
     pub(super) classes: Vec<MaterialClass>,
     /// The map from the surface's uv to that texture's.
     pub(super) uv: UvTransform,
-    /// The class of each part; none where its triangles belong to several.
+    /// The class of each part; absent if its triangles belong to several.
     pub(super) of_parts: Vec<Option<MaterialClass>>,
 }
 

@@ -51,7 +51,7 @@ impl<'a> Lookups<'a> {
         }
     }
 
-    /// The uv set of the material; none where it has no texture.
+    /// The uv set of the material; absent if it has no texture.
     fn set(&self) -> Option<u32> {
         let first = self.base_color.as_ref().or(self.metallic_roughness.as_ref()).or(self.emissive.as_ref());
         first.map(|lookup| lookup.set)
@@ -288,7 +288,7 @@ impl Reader<'_> {
         Some(MaterialModel::Dielectric { eta, specular_reflectance, specular_transmittance: color, microfacets })
     }
 
-    /// The opacity of the alpha mode; none where everything is opaque.
+    /// The opacity of the alpha mode; absent if everything is opaque.
     fn opacity(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> Option<ScalarInput> {
         let factor = match material.pbr_specular_glossiness() {
             Some(specular) => specular.diffuse_factor()[3],

@@ -116,7 +116,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The map of all suns, added to the scene with the first of them; none where there are too many lights.
+    /// The map of all suns, added to the scene with the first of them; absent if there are too many lights.
     fn sun_map(&mut self, pointer: &str) -> Option<TextureIndex> {
         let known = self.scene.lights.iter().find_map(|light| match light {
             LightGroup { emission: Emission::Environment { texture, .. }, .. } => Some(*texture),

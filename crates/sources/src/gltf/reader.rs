@@ -73,7 +73,7 @@ impl<'a> Reader<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ReadMaterial {
     pub(super) index: MaterialIndex,
-    /// The set of texture coordinates that its textures are looked up at; none where it has no texture.
+    /// The set of texture coordinates that its textures are looked up at; absent if it has no texture.
     pub(super) uv_set: Option<u32>,
     /// What the file states of it.
     pub(super) stated: StatedParameters,

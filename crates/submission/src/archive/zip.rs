@@ -172,7 +172,7 @@ impl Archive {
         Ok(())
     }
 
-    /// Where an entry's data begin; none where its own header is invalid or has another name than the central
+    /// Where an entry's data begin; absent if its own header is invalid or has another name than the central
     /// directory.
     fn data_start(&mut self, entry: &Entry, name: &[u8], end: u64) -> Result<Option<u64>, Fault> {
         const HEADER: u64 = 30;

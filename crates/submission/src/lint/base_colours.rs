@@ -140,7 +140,7 @@ pub(super) fn decoding(place: &str, looks: &[Look], are_png: bool) -> Decoding {
     if off_own.ln().abs() <= off_then.ln().abs() / 2.0 { Decoding::Right } else { Decoding::Unknown }
 }
 
-/// The strength of the base colour's hues over that of the picture's; none where they do not correlate.
+/// The strength of the base colour's hues over that of the picture's; absent if they do not correlate.
 fn strength(looks: &[Look], change: fn(f32) -> f32) -> Option<f64> {
     let hues = [1, 2].map(|channel| hue(looks, channel, change));
     let judged = hues.iter().filter(|hues| {

@@ -300,7 +300,7 @@ struct CopyCount {
 }
 
 impl CopyCount {
-    /// Counts an instance's maps; none where the ground truth is withheld.
+    /// Counts an instance's maps; absent if the ground truth is withheld.
     fn of(folder: &SceneFolder, instance: &InstanceId, files: &[Option<MapFile>; 3]) -> Self {
         let mut count = Self::default();
         for (map, file) in Map::ALL.into_iter().zip(files) {

@@ -32,7 +32,7 @@ const COARSE: usize = 64;
 pub(super) struct SeenPixel {
     /// The places of the atlas that four places of the pixel show; v runs upwards.
     pub(super) uvs: [[f32; 2]; 4],
-    /// The picture's colour, linear; none where the dataset has no picture.
+    /// The picture's colour, linear; absent if the dataset has no picture.
     pub(super) photo: Option<[f32; 3]>,
     /// Its neighbourhood in the picture.
     pub(super) tile: usize,
@@ -225,7 +225,7 @@ pub(super) struct ScalarLook {
     pub(super) metallic: f32,
 }
 
-/// Both maps at each pixel that shows the instance; none where a map is missing.
+/// Both maps at each pixel that shows the instance; absent if a map is missing.
 pub(super) fn scalar_looks(
     pixels: &[SeenPixel],
     roughness: Option<Texture>,

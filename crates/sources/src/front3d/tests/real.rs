@@ -12,7 +12,7 @@ use crate::front3d::camera_sampler::RoomSampler;
 const TWO_BEDROOMS: &str = "07700701-1835-4532-8af0-bd8c7f624b1b";
 const STORAGE: &str = "dc74ad5c-34cf-4237-a3f3-a94297a907c8";
 
-/// The house; none where the shared data are missing.
+/// The house; absent if the shared data are missing.
 fn real(uid: &str) -> Option<FurnishedHouse> {
     shared_data(&format!("3d-front/3D-FRONT/{uid}.json"))?;
     let files = HouseFiles {
@@ -119,7 +119,7 @@ fn a_truncated_picture_is_reported() {
     assert!(seen > 0);
 }
 
-/// The number of draws for ten cameras of a room, by the seeds 1 to 10; none where some seed finds no camera.
+/// The number of draws for ten cameras of a room, by the seeds 1 to 10; absent if some seed finds no camera.
 fn draws(house: &FurnishedHouse, world: &World, room: usize, rules: CameraRules) -> Option<u32> {
     let [width, height] = rules.resolution();
     let intrinsics = Intrinsics::from_fov_y(width, height, rules.fov_y_deg().to_radians());
