@@ -9,7 +9,7 @@ fn what_exists_is_named_and_not_downloaded_again() {
     }
     let mut command = mateval();
     command.args(["fetch", "lpips"]).env("PIP_INDEX_URL", "http://127.0.0.1:9/");
-    let found = run(&mut command).ends_with(0);
+    let found = run(&mut command).ends_with(0).says("already present: ");
     assert_eq!(found.stdout.lines().count(), 2, "{}", found.stdout);
     assert!(found.stdout.contains("lpips-alex-v0.1.safetensors"), "{}", found.stdout);
 }

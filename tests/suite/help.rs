@@ -57,9 +57,20 @@ fn unknown_arguments() {
     let error = "error: unrecognized subcommand 'gray'\n\n  tip: a similar subcommand exists: 'grey'\n\n\
                  Usage: mateval baseline <COMMAND>\n\nFor more information, try '--help'.\n";
     check(&["baseline", "gray", "--dataset", "d", "--out", "o"], 2, "", error);
-    let error = "error: invalid value '../up' for '--scene <SCENE>': '../up' is not an id: expected \
-                 ^[a-z0-9][a-z0-9_-]{0,63}$\n\nFor more information, try '--help'.\n";
+    let error = "error: invalid value '../up' for '--scene <SCENE>': '../up' is not an id: expected 1 to 64 \
+                 lower-case letters (a-z), digits, '-' and '_', of which the first is a letter or a digit\n\n  \
+                 tip: `mateval prep stats DATASET` lists the ids of a dataset's scenes\n\nFor more information, try '--help'.\n";
     check(&["prep", "render", "d", "--scene", "../up"], 2, "", error);
+    // Commands without their group, by the tree of commands.
+    for (words, tip) in [
+        (&["score"][..], "`mateval eval score`"),
+        (&["leaderboard", "r.json"], "`mateval eval leaderboard`"),
+        (&["verify"], "`mateval prep verify` or `mateval eval verify`"),
+        (&["prep", "lint", "--out", "x"], "`mateval eval lint`"),
+        (&["eval", "prep"], "`mateval prep`"),
+    ] {
+        run(mateval().args(words)).ends_with(2).says(&format!("tip: did you mean {tip}?\n"));
+    }
 }
 
 /// Memory and time grow with the samples, so a typing error must not ask for a thousand million.

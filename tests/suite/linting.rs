@@ -60,7 +60,12 @@ fn the_verdict_is_one_line_and_the_exit_code() {
     let bare = lint(&submission, &[]).ends_with(1);
     for (map, value) in [("roughness", "0.5"), ("metallic", "0")] {
         let line = bare.stdout.lines().find(|line| line.starts_with(&format!("note [default_{map}] "))).unwrap();
-        assert!(line.contains(&format!("{map} is missing, which the format allows; scored as {value} (")), "{line}");
+        assert!(
+            line.contains(&format!(
+                "{map} is missing, which the format allows; rendered as {value}; scored as {value} too"
+            )),
+            "{line}"
+        );
     }
     let none = lint(&folder.path().join("none"), &[]).ends_with(2);
     assert!(none.stdout.is_empty() && none.error().contains("none'"), "{}", none.stderr);

@@ -161,7 +161,10 @@ fn a_build_resumes_after_a_killed_render() {
     run(&mut render(&whole, 1)).ends_with(0);
     let renders = out.join("scenes/first/ground_truth/renders/builtin");
     kill_when(&mut render(&out, 1), || renders.join("up_left/rgb_a.exr").is_file());
-    run(mateval().args(["prep", "finish"]).arg(&out)).ends_with(2).says("unlisted_file");
+    let resumes = format!("mateval prep render {} --renderer builtin", out.display());
+    run(mateval().args(["prep", "finish"]).arg(&out)).ends_with(2).says("unlisted_file").says(&resumes);
+    run(mateval().args(["prep", "stats"]).arg(&out)).ends_with(0);
+    assert!(run(&mut verify(&out)).ends_with(1).stdout.contains(&resumes));
     run(&mut build(&WHOLE.recipe, &out)).ends_with(0).says("scene 'first' was already made");
     run(&mut render(&out, 1)).ends_with(0);
     assert!(manifest(&out) == manifest(&whole));

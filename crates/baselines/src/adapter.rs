@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::submission::{Map, StoredEncoding};
 use mateval_files::FileError;
+use mateval_files::untrusted::in_words;
 use mateval_image::texture_io::read_texture;
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
 use serde::Deserialize;
@@ -77,7 +78,7 @@ impl Adapter {
 
     fn parse(text: &str, path: &Path) -> Result<Self, BaselineError> {
         let invalid = |why: &str| BaselineError::Unusable(format!("adapter '{}': {why}", path.display()));
-        let adapter: Self = toml::from_str(text).map_err(|error| invalid(&error.to_string()))?;
+        let adapter: Self = toml::from_str(text).map_err(|error| invalid(&in_words(&error.to_string())))?;
         if adapter.maps().next().is_none() {
             return Err(invalid("it names no file; expected base_color, roughness or metallic"));
         }

@@ -17,6 +17,7 @@ use mateval_baselines::median::{self, MedianOf};
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
 use mateval_dataset::open::Dataset;
+use mateval_dataset::progress::wrapped;
 use mateval_dataset::{Finding, Severity, json};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
 use mateval_eval::protocol::Protocol;
@@ -31,14 +32,14 @@ use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
 use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
 use mateval_report::strips::Shown;
-use mateval_report::tables::{Grouping, TableFormat, headline, tables, wrapped};
+use mateval_report::tables::{Grouping, TableFormat, headline, tables};
 use serde::{Deserialize, Serialize};
 
 use crate::TOOL;
 use crate::arguments::check_outside_datasets;
 use crate::fetch::{cache_folder, load_weights};
 use crate::prep::make::{BlenderArgs, checked_renderer, renderer_parser, samples_parser};
-use crate::terminal::{Outcome, counted, error_text, print, say, with_progress};
+use crate::terminal::{Outcome, columns, counted, error_text, print, say, with_progress};
 
 /// The protocol whose numbers are printed.
 const PROTOCOL: &str = "mateval-3";
@@ -435,7 +436,7 @@ fn close(places: &Places, options: &Options, dataset: &Dataset, full: bool) -> a
     let read = |path: PathBuf| ResultFile::read(&path);
     let results = ranked.iter().map(|baseline| read(places.result(*baseline))).collect::<Result<Vec<_>, _>>()?;
     let ceiling = ceiling.map(read).transpose()?;
-    let format = TableFormat::Text { bold: std::io::stdout().is_terminal() };
+    let format = TableFormat::Text { bold: std::io::stdout().is_terminal(), columns: columns() };
     let shown = match full {
         true => tables(&results, ceiling.as_ref(), PROTOCOL, Grouping::Dataset, format)?,
         false => headline(&results, ceiling.as_ref(), PROTOCOL, format)?,

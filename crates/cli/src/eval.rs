@@ -21,7 +21,7 @@ use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs};
 use crate::TOOL;
 use crate::arguments::{Format, check_output_file, check_outside_datasets, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
-use crate::terminal::{Outcome, print, say_findings, with_progress};
+use crate::terminal::{Outcome, print, print_fitted, say_findings, with_progress};
 
 /// Subcommands of `eval`.
 #[derive(clap::Subcommand)]
@@ -84,10 +84,10 @@ impl LintArgs {
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
         let file = lint_report(self, &dataset).context("cannot check the submission")?;
         self.out.iter().try_for_each(|out| json::write(out, &file))?;
-        print(&match self.format {
-            Format::Json => json::to_text(&file),
-            Format::Text => plain(&file),
-        })?;
+        match self.format {
+            Format::Json => print(&json::to_text(&file))?,
+            Format::Text => print_fitted(&plain(&file))?,
+        }
         Ok(if file.good { Outcome::Good } else { Outcome::No })
     }
 }
@@ -262,10 +262,10 @@ impl VerifyArgs {
         };
         let found = with_progress(|progress| verify(plan, progress)).context("cannot verify")?;
         self.out.iter().try_for_each(|out| json::write(out, &found))?;
-        print(&match self.format {
-            Format::Json => json::to_text(&found),
-            Format::Text => verification_text(&found),
-        })?;
+        match self.format {
+            Format::Json => print(&json::to_text(&found))?,
+            Format::Text => print_fitted(&verification_text(&found))?,
+        }
         Ok(if found.confirmed { Outcome::Good } else { Outcome::No })
     }
 }

@@ -18,9 +18,14 @@ mod prep;
 mod terminal;
 
 use std::ffi::OsString;
+use std::path::Path;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use mateval_dataset::SceneId;
+use mateval_dataset::open::read_dataset_file;
+use mateval_files::untrusted::nearest;
 
 pub use fetch::{cache_folder, find_weights};
 use terminal::Outcome;
@@ -73,6 +78,7 @@ fn run(words: &[OsString]) -> u8 {
         Ok(cli) => carry_out(&cli.command),
         Err(refusal) if refusal.use_stderr() => {
             // Nothing can be done where stderr is gone.
+            let refusal = with_tip(refusal, words);
             let _ = refusal.print();
             return u8::try_from(refusal.exit_code()).unwrap_or(2);
         }
@@ -85,6 +91,53 @@ fn run(words: &[OsString]) -> u8 {
             terminal::say(&format!("error: {}", terminal::error_text(&error)));
             2
         }
+    }
+}
+
+/// The refusal of a command line, with the command or the scene that was probably meant.
+fn with_tip(mut refusal: clap::Error, words: &[OsString]) -> clap::Error {
+    let text = |kind| refusal.get(kind).map(ToString::to_string).unwrap_or_default();
+    let tip = match refusal.kind() {
+        ErrorKind::InvalidSubcommand => {
+            let mut found = Vec::new();
+            find_commands(&Cli::command(), &text(ContextKind::InvalidSubcommand), "mateval", &mut found);
+            (!found.is_empty()).then(|| format!("did you mean {}?", found.join(" or ")))
+        }
+        ErrorKind::ValueValidation if text(ContextKind::InvalidArg).ends_with("<SCENE>") => {
+            Some(scene_tip(&text(ContextKind::InvalidValue), words))
+        }
+        _ => None,
+    };
+    if let Some(tip) = tip {
+        // Of a command with the same name elsewhere, those that only resemble it distract.
+        refusal.remove(ContextKind::SuggestedSubcommand);
+        refusal.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    }
+    refusal
+}
+
+/// The commands below `command` that have this name, with the words before it.
+fn find_commands(command: &clap::Command, name: &str, before: &str, found: &mut Vec<String>) {
+    for below in command.get_subcommands() {
+        let words = format!("{before} {}", below.get_name());
+        if below.get_name() == name {
+            found.push(format!("`{words}`"));
+        }
+        find_commands(below, name, &words, found);
+    }
+}
+
+/// What helps where `given` cannot be a scene's id: the scenes of the dataset that the command line names.
+fn scene_tip(given: &str, words: &[OsString]) -> String {
+    let paths =
+        words.iter().filter_map(|word| word.to_str()).map(|word| word.strip_prefix("--dataset=").unwrap_or(word));
+    let dataset = paths.map(Path::new).find_map(|path| Some((path, read_dataset_file(path).ok()?)));
+    let Some((path, dataset)) = dataset else {
+        return "`mateval prep stats DATASET` lists the ids of a dataset's scenes".to_owned();
+    };
+    match nearest(given, dataset.scenes.iter().map(SceneId::as_str)) {
+        Some(scene) => format!("did you mean '{scene}'?"),
+        None => format!("`mateval prep stats {}` lists the ids of its scenes", path.display()),
     }
 }
 

@@ -17,7 +17,7 @@ use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, sam
 use self::publish::{ExportArgs, PublishArgs};
 use crate::TOOL;
 use crate::arguments::{Format, check_output_file, check_outside_datasets, open_dataset};
-use crate::terminal::{Outcome, print, say, with_progress};
+use crate::terminal::{Outcome, columns, print, print_fitted, say, with_progress};
 
 /// Subcommands of `prep`.
 #[derive(clap::Subcommand)]
@@ -87,10 +87,10 @@ impl VerifyArgs {
             })))?,
             Format::Text => {
                 for finding in &findings {
-                    print(&format!("{finding}\n"))?;
+                    print_fitted(&format!("{finding}\n"))?;
                 }
                 let verdict = if errors == 0 { "sound" } else { "NOT sound" };
-                print(&format!("{}: {verdict}, {errors} errors\n", self.dataset.display()))?;
+                print_fitted(&format!("{}: {verdict}, {errors} errors\n", self.dataset.display()))?;
             }
         }
         Ok(if errors == 0 { Outcome::Good } else { Outcome::No })
@@ -133,7 +133,7 @@ impl CompareArgs {
             .context("cannot compare the dataset's pictures")?;
         match self.format {
             Format::Json => print(&json::to_text(&file))?,
-            Format::Text => print(&tables::text(&file))?,
+            Format::Text => print(&tables::text(&file, columns()))?,
         }
         if let Some(out) = &self.out {
             say(&format!("{}: both pictures side by side", out.join("index.html").display()));
@@ -171,9 +171,9 @@ impl StatsArgs {
         }
         match (self.format, &self.picture) {
             (Format::Json, _) => print(&json::to_text(&counted))?,
-            (Format::Text, None) => print(&stats::show::text(&counted))?,
+            (Format::Text, None) => print(&stats::show::text(&counted, columns()))?,
             (Format::Text, Some(picture)) => {
-                print(&format!("{}\n{}\n", stats::show::text(&counted), picture.display()))?
+                print(&format!("{}\n{}\n", stats::show::text(&counted, columns()), picture.display()))?
             }
         }
         Ok(Outcome::Good)

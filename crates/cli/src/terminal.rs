@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use console::Term;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use mateval_dataset::progress::fitted;
 use mateval_dataset::{Finding, Progress, Report, Severity};
-use mateval_report::tables::wrapped;
 
 /// The name and version of this program, which datasets and results record, as in `mateval 0.1.0`.
 pub const TOOL: &str = concat!("mateval ", env!("CARGO_PKG_VERSION"));
@@ -27,6 +27,19 @@ pub enum Outcome {
 pub fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     written(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// Prints lines of sentences to stdout, wrapped between words where that is a terminal; fails as [`print()`] does.
+pub fn print_fitted(text: &str) -> anyhow::Result<()> {
+    match columns() {
+        Some(columns) => print(&fitted(text, columns)),
+        None => print(text),
+    }
+}
+
+/// The width of the terminal that shows stdout; absent where stdout is none.
+pub fn columns() -> Option<usize> {
+    Term::stdout().size_checked().map(|(_, columns)| usize::from(columns))
 }
 
 /// Prints a help text or the version to stdout, in colours on a terminal; fails as [`print()`] does.
@@ -57,12 +70,6 @@ pub fn say(text: &str) {
         None => text.to_owned(),
     };
     let _ = writeln!(std::io::stderr().lock(), "{text}");
-}
-
-/// The text with each line wrapped that is wider than the terminal.
-fn fitted(text: &str, columns: usize) -> String {
-    let lines: Vec<String> = text.split('\n').flat_map(|line| wrapped(line.split(' '), "", "  ", columns)).collect();
-    lines.join("\n")
 }
 
 /// A count with its noun: `1 scene`, `2 scenes`.
@@ -196,13 +203,6 @@ fn label(name: &str, count: Option<[usize; 2]>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn lines_that_fit_are_left_alone_and_others_wrapped() {
-        let text = "1/6  sample      2 s\nerror: 'a b' does not exist";
-        assert_eq!(fitted(text, 80), text);
-        assert_eq!(fitted(text, 20), "1/6  sample      2 s\nerror: 'a b' does\n  not exist");
-    }
 
     #[test]
     fn one_takes_the_singular() {

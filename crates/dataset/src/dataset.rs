@@ -408,6 +408,14 @@ pub enum PerturbationKind {
 
 impl PerturbationKind {
     pub const ALL: [Self; 3] = [Self::Pose, Self::Scale, Self::Shape];
+
+    /// The highest level; the lowest is 1.
+    pub fn most_level(self) -> u32 {
+        match self {
+            Self::Pose | Self::Shape => 3,
+            Self::Scale => 2,
+        }
+    }
 }
 
 /// The word that JSON files and commands use.

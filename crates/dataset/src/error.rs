@@ -20,10 +20,15 @@ pub enum SceneError {
     },
     /// Scenes were changed apart, and the dataset does not list the changes yet.
     #[error(
-        "'{}' is not finished: {} changed since its manifest was written; run `mateval prep finish {}`",
-        path.display(), if scenes.len() == 1 { format!("scene {}", quoted(scenes)) } else { format!("scenes {}", quoted(scenes)) }, path.display()
+        "'{}' is not finished: scene{} {} changed since its manifest was written; run `{}`",
+        path.display(), if scenes.len() == 1 { "" } else { "s" }, quoted(scenes), command
     )]
-    Unfinished { path: PathBuf, scenes: Vec<SceneId> },
+    Unfinished {
+        path: PathBuf,
+        scenes: Vec<SceneId>,
+        /// What makes the manifest list the changes.
+        command: String,
+    },
     /// A file breaks the format; every fault is listed.
     #[error("'{}' is not valid:{}", path.display(), Finding::list(findings))]
     Invalid { path: PathBuf, findings: Vec<Finding> },

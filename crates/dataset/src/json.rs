@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use mateval_files::FileError;
-use mateval_files::untrusted::{hint, read_at_most, without_mark};
+use mateval_files::untrusted::{hint, in_words, read_at_most, shortened, without_mark};
 use mateval_files::whole::write_whole;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,6 @@ use serde_json::ser::{Formatter, PrettyFormatter};
 use serde_path_to_error::Segment;
 
 use crate::SceneError;
-use mateval_files::untrusted::shortened;
 
 /// Largest JSON file that is read, in bytes.
 const MAX_JSON_BYTES: u64 = 256 << 20;
@@ -128,7 +127,8 @@ struct Head {
 pub fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, SceneError> {
     let text = without_mark(text);
     // Following the JSON path costs time, so only a text that is known to be bad is parsed that way.
-    serde_json::from_slice(text).map_err(|error| invalid(path, pointer::<T>(text), format!("{error}{}", hint(text))))
+    serde_json::from_slice(text)
+        .map_err(|error| invalid(path, pointer::<T>(text), format!("{}{}", in_words(&error.to_string()), hint(text))))
 }
 
 /// The JSON pointer of the first fault; empty where the text is no JSON at all, or the fault is in the whole of it.

@@ -17,6 +17,7 @@ use crate::{Finding, SceneError, SceneId, Severity, json};
 
 /// The code of a finding about a file that the manifest lists and the dataset lacks.
 pub const MISSING_FILE: &str = "missing_file";
+const UNLISTED_FILE: &str = "unlisted_file";
 
 /// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files
 /// in `root` itself. Links to folders are not followed.
@@ -191,7 +192,7 @@ fn unlisted_file(root: &Path, file: &str) -> Finding {
         let fault = fault("linked_folder", file, String::new(), LINKED_FOLDER);
         return Finding { action: NO_LINKED_FOLDER.to_owned(), ..fault };
     }
-    fault("unlisted_file", file, String::new(), "not listed in the manifest")
+    fault(UNLISTED_FILE, file, String::new(), "not listed in the manifest")
 }
 
 fn fault(code: &str, file: &str, place: String, message: &str) -> Finding {
@@ -282,7 +283,7 @@ impl SceneHashes {
         let unlisted = self.found()?.into_iter().filter(|file| concerns(file) && !self.files.contains_key(file));
         findings.extend(unlisted.map(|file| unlisted_file(&self.root, &file)));
         findings.sort();
-        Ok(findings.into_iter().map(with_advice).collect())
+        Ok(findings.into_iter().map(|finding| self.with_advice(finding)).collect())
     }
 
     /// Lists the files as they are now, after `prep` wrote them, and keeps the list. Only those are read whose size or
@@ -310,6 +311,26 @@ impl SceneHashes {
         BuildFolder::of(&self.root).note_change(&self.scene)
     }
 
+    /// The finding with the command that helps, whatever else is wrong with other scenes.
+    fn with_advice(&self, finding: Finding) -> Finding {
+        let (root, scene) = (self.root.display(), &self.scene);
+        let action = match (rendered_by(&finding.file), finding.code.as_str()) {
+            // Not this scene's alone, which would leave the manifest to `prep finish`.
+            (Some(which), UNLISTED_FILE) => format!(
+                "a render was interrupted: `mateval prep render {root} {which}` resumes it (with --scene {scene} in this \
+                 scene alone)"
+            ),
+            // A render keeps a view that it finds done, whatever its pictures hold.
+            (Some(which), _) => format!(
+                "the file was changed by hand: `mateval prep render {root} {which} --scene {scene} --force` renders it again"
+            ),
+            (None, _) => {
+                format!("the file was changed by hand: make the scene again by `prep build --scene {scene} --force`")
+            }
+        };
+        Finding { action, ..finding }
+    }
+
     fn keep(&self) -> Result<(), SceneError> {
         let list = BuildFolder::of(&self.root).hashes(&self.scene);
         let parent = list.parent().unwrap_or(Path::new("."));
@@ -332,16 +353,32 @@ impl SceneHashes {
     }
 }
 
-/// The finding with the command that helps.
-fn with_advice(finding: Finding) -> Finding {
-    let action = match (is_rendered(&finding.file), finding.file.contains("/renders/scorer/")) {
-        (true, true) => {
-            "run `prep render --only scorer` for this scene: it was cut off, or the file was changed by hand"
-        }
-        (true, false) => "run `prep render` again for this scene: it was cut off, or the file was changed by hand",
-        (false, _) => "make the scene again by `prep build --scene SCENE --force`: the file was changed by hand",
-    };
-    Finding { action: action.to_owned(), ..finding }
+/// The error where scenes that `concerns` accepts changed since the manifest was written.
+pub fn unfinished(root: &Path, concerns: impl Fn(&SceneId) -> bool) -> Option<SceneError> {
+    let scenes: Vec<SceneId> = BuildFolder::of(root).changed().into_iter().filter(concerns).collect();
+    let command = finishing_command(root, &scenes);
+    (!scenes.is_empty()).then(|| SceneError::Unfinished { path: root.to_owned(), scenes, command })
+}
+
+/// The command after which the manifest lists the `changed` scenes: the render that was interrupted, which `prep finish`
+/// would refuse to list, or else `prep finish`.
+pub fn finishing_command(root: &Path, changed: &[SceneId]) -> String {
+    let cut_off = changed.iter().find_map(|scene| {
+        let hashes = SceneHashes::open(root, scene).ok()?;
+        let files = list_below(root, Path::new(&folder(scene))).ok()?;
+        let is_ours = |file: &&String| is_rendered(file) && !file.split('/').any(is_temporary);
+        files.iter().filter(is_ours).find(|file| !hashes.files.contains_key(*file)).and_then(|file| rendered_by(file))
+    });
+    match cut_off {
+        Some(which) => format!("mateval prep render {} {which}", root.display()),
+        None => format!("mateval prep finish {}", root.display()),
+    }
+}
+
+/// The options of `prep render` that make this file of a scene; absent if it is not rendered.
+fn rendered_by(file: &str) -> Option<String> {
+    let (renderer, _) = file.split_once("/ground_truth/renders/")?.1.split_once('/')?;
+    Some(if renderer == "scorer" { "--only scorer".to_owned() } else { format!("--renderer {renderer}") })
 }
 
 fn folder(scene: &SceneId) -> String {

@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile, WideView};
-use crate::layout::{BuildFolder, DATASET, MANIFEST, SceneFolder, TARGETS};
+use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use crate::{Finding, RendererId, SceneError, SceneId, Severity, SourceKind, ViewId, json, manifest};
 
 /// A finished dataset on disk.
@@ -227,11 +227,10 @@ fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), Scen
     if findings.is_empty() {
         return Ok(());
     }
-    let path = root.to_owned();
-    let scenes = BuildFolder::of(root).changed();
-    if !scenes.is_empty() {
-        return Err(SceneError::Unfinished { path, scenes });
+    if let Some(error) = manifest::unfinished(root, |_| true) {
+        return Err(error);
     }
+    let path = root.to_owned();
     let is_withheld =
         |finding: &Finding| finding.code == manifest::MISSING_FILE && finding.file.contains("/ground_truth/");
     if findings.iter().all(is_withheld) {

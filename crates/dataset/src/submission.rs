@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::Perturbation;
 use crate::ids::{InstanceId, SceneId};
-use crate::{SceneError, json};
+use crate::{Finding, SceneError, Severity, json};
 
 pub const SUBMISSION: &str = "submission.json";
 
@@ -51,9 +51,33 @@ pub struct SubmissionFile {
 }
 
 impl SubmissionFile {
-    /// Parses the bytes of a submission's file; `path` is for the error alone. Fails where its format is another one.
+    /// Parses the bytes of a submission's file; `path` is for the error alone. Fails where its format is another one,
+    /// and where a number is out of range.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
-        json::parse_format(path, bytes, SUBMISSION_FORMAT)
+        let file: Self = json::parse_format(path, bytes, SUBMISSION_FORMAT)?;
+        let findings = file.numbers_out_of_range();
+        match findings.is_empty() {
+            true => Ok(file),
+            false => Err(SceneError::Invalid { path: path.to_owned(), findings }),
+        }
+    }
+
+    /// A finding for each number that has no meaning, which would stand in tables and curves.
+    pub fn numbers_out_of_range(&self) -> Vec<Finding> {
+        let found = |place: &str, message: String, action: &str| {
+            Finding::new(Severity::Error, "out_of_range", SUBMISSION, place, message, action)
+        };
+        // JSON has neither NaN nor infinities.
+        let cost = self.cost.as_ref().filter(|cost| cost.seconds_a_scene < 0.0).map(|cost| {
+            let message = format!("expected a number of at least 0, found {}", cost.seconds_a_scene);
+            found("/cost/seconds_a_scene", message, "write the seconds for one scene, or leave out `cost`")
+        });
+        let geometry = self.geometry.filter(|it| !(1..=it.kind.most_level()).contains(&it.level)).map(|it| {
+            let message = format!("{} has the levels 1 to {}, found {}", it.kind, it.kind.most_level(), it.level);
+            let action = "copy `perturbation` of the dataset's dataset.json, or leave out `geometry` for the true one";
+            found("/geometry/level", message, action)
+        });
+        cost.into_iter().chain(geometry).collect()
     }
 }
 

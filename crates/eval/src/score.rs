@@ -6,11 +6,11 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::layout::BuildFolder;
+use mateval_dataset::manifest;
 use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::verdict::{CompareCounts, VerdictFile};
-use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json};
 use mateval_files::cache::{Cache, Key};
 use mateval_metrics::Lpips;
 use mateval_submission::atlas::AtlasMeshes;
@@ -110,10 +110,9 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     plan.check()?;
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
     // The light of a scene that was rendered apart since the manifest was written would silently not be scored.
-    let mut changed = BuildFolder::of(&plan.dataset.root).changed();
-    changed.retain(|id| scenes.iter().any(|scene| scene.id == *id));
-    if !changed.is_empty() {
-        return Err(SceneError::Unfinished { path: plan.dataset.root.clone(), scenes: changed }.into());
+    let is_scored = |id: &SceneId| scenes.iter().any(|scene| scene.id == *id);
+    if let Some(error) = manifest::unfinished(&plan.dataset.root, is_scored) {
+        return Err(error.into());
     }
     plan.check_cached(&scenes)?;
     if let Some(absence) = plan.dataset.absence().filter(|_| plan.scenes.is_empty()) {

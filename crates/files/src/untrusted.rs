@@ -165,6 +165,75 @@ pub fn shown(name: &str, most: usize) -> String {
     }
 }
 
+/// The message of a reader of JSON or TOML, with words for the Rust types that it expects: what the file's author must
+/// write.
+pub fn in_words(message: &str) -> String {
+    const EXPECTED: &str = ", expected ";
+    let Some(at) = message.rfind(EXPECTED).map(|at| at + EXPECTED.len()) else { return message.to_owned() };
+    let (before, after) = message.split_at(at);
+    // JSON's reader appends the place, that of TOML puts it first, above the line that it quotes.
+    let (found, rest) = after.split_at(after.find(" at line ").or(after.find('\n')).unwrap_or(after.len()));
+    let whole = |least: i128, most: u128| format!("a whole number from {least} to {most}");
+    let words = match found {
+        "u8" => whole(0, u8::MAX.into()),
+        "u16" => whole(0, u16::MAX.into()),
+        "u32" => whole(0, u32::MAX.into()),
+        "u64" | "usize" => whole(0, u64::MAX.into()),
+        "i32" => whole(i32::MIN.into(), i32::MAX as u128),
+        "i64" => whole(i64::MIN.into(), i64::MAX as u128),
+        "a nonzero u16" => whole(1, u16::MAX.into()),
+        "a nonzero u32" => whole(1, u32::MAX.into()),
+        "f32" | "f64" => "a number".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        "unit" => "null".to_owned(),
+        _ if ["a map", "struct ", "tuple struct "].iter().any(|start| found.starts_with(start)) => {
+            if message.starts_with("TOML") { "a table" } else { "an object" }.to_owned()
+        }
+        _ => found.to_owned(),
+    };
+    format!("{before}{words}{rest}")
+}
+
+/// A name in lower case, letters and digits only: `Base-Color` becomes `basecolor`.
+pub fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
+/// The candidate nearest to `name`, comparing letters and digits only. At most a third of its letters may differ.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let wanted = plain(name);
+    let most = (wanted.chars().count() / 3).max(1);
+    candidates
+        .into_iter()
+        .map(|candidate| (distance(&wanted, &plain(candidate)), candidate))
+        .filter(|(distance, _)| *distance <= most)
+        .min()
+        .map(|(_, candidate)| candidate)
+}
+
+/// Letters of a name that [`distance`] compares, whose cost grows with their square.
+const LONGEST: usize = 80;
+
+/// The number of letters to insert, delete, change or exchange with their neighbour (optimal string alignment).
+pub fn distance(a: &str, b: &str) -> usize {
+    let [a, b] = [a, b].map(|text| text.chars().take(LONGEST).collect::<Vec<char>>());
+    let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];
+    for (i, j) in (0..=a.len()).flat_map(|i| (0..=b.len()).map(move |j| (i, j))) {
+        if i == 0 || j == 0 {
+            rows[i][j] = i + j;
+            continue;
+        }
+        let changed = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+        let mut least = changed.min(rows[i - 1][j] + 1).min(rows[i][j - 1] + 1);
+        if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+            least = least.min(rows[i - 2][j - 2] + 1);
+        }
+        rows[i][j] = least;
+    }
+    rows[a.len()][b.len()]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -219,5 +288,36 @@ mod tests {
             assert_eq!(mistaken_for(bytes), None);
         }
         assert_eq!((without_mark(b"\xef\xbb\xbf{}"), without_mark(b"{}")), (b"{}".as_slice(), b"{}".as_slice()));
+    }
+
+    #[test]
+    fn readers_name_no_type_of_rust() {
+        for (message, words) in [
+            ("invalid type: string \"x\", expected u8 at line 1 column 9", "a whole number from 0 to 255 at line 1"),
+            ("invalid value: integer `-1`, expected u32", "`-1`, expected a whole number from 0 to 4294967295"),
+            ("invalid type: null, expected f64 at line 2 column 1", "expected a number at line 2"),
+            ("TOML parse error at line 1, column 3\n\ninvalid type: integer `1`, expected struct Cost\n", "a table\n"),
+            ("invalid type: integer `1`, expected struct Cost with 2 elements at line 1 column 1", "an object at line"),
+            ("unknown field `a`, expected `u8` or `b`", "expected `u8` or `b`"),
+            ("EOF while parsing a value at line 1 column 0", "EOF while"),
+        ] {
+            assert!(in_words(message).contains(words), "{}", in_words(message));
+        }
+    }
+
+    #[test]
+    fn distances_of_known_words() {
+        for (a, b, expected) in [("kitten", "sitting", 3), ("", "abc", 3), ("ab", "ba", 1), ("same", "same", 0)] {
+            assert_eq!((distance(a, b), distance(b, a)), (expected, expected), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_nearest_name_or_none() {
+        let known = ["wall_paper", "table", "table-2", "rug"];
+        assert_eq!(nearest("Wall-Paper", known), Some("wall_paper"));
+        assert_eq!(nearest("tabel", known), Some("table"));
+        assert_eq!(nearest("table2", known), Some("table-2"));
+        assert_eq!(nearest("sofa", known), None);
     }
 }

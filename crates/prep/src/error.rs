@@ -6,6 +6,7 @@ use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::ids::quoted;
 use mateval_dataset::{RendererId, SceneId, ViewId};
 use mateval_files::FileError;
+use mateval_files::untrusted::in_words;
 
 use crate::build::fault::SceneFault;
 use crate::recipe::fault::RecipeFault;
@@ -33,7 +34,7 @@ pub enum PrepError {
     #[error("recipe '{}': {}", path.display(), joined(faults))]
     Recipe { path: PathBuf, faults: Vec<RecipeFault> },
     /// A file of a survey's rules that is not valid.
-    #[error("rules '{}': {}", path.display(), source.to_string().trim_end())]
+    #[error("rules '{}': {}", path.display(), in_words(source.to_string().trim_end()))]
     Rules {
         path: PathBuf,
         /// What is wrong with it, and where.

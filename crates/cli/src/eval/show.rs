@@ -19,7 +19,7 @@ use mateval_submission::archive::Opened;
 
 use crate::TOOL;
 use crate::arguments::{Format, check_outside_datasets, open_submission};
-use crate::terminal::{Outcome, print, say, with_progress};
+use crate::terminal::{Outcome, columns, print, say, with_progress};
 
 #[derive(clap::Args)]
 pub struct TablesArgs {
@@ -64,7 +64,7 @@ impl TablesArgs {
             FormatName::Markdown => TableFormat::Markdown,
             FormatName::Latex => TableFormat::Latex,
             FormatName::Csv => TableFormat::Csv,
-            FormatName::Text => TableFormat::Text { bold: std::io::stdout().is_terminal() },
+            FormatName::Text => TableFormat::Text { bold: std::io::stdout().is_terminal(), columns: columns() },
         };
         let grouping = match self.by {
             None => Grouping::Dataset,
@@ -136,7 +136,7 @@ impl ExplainArgs {
         }
         print(&match self.format {
             Format::Json => json::to_text(&found.file),
-            Format::Text => explain::text::plain(&found.file),
+            Format::Text => explain::text::plain(&found.file, columns()),
         })?;
         Ok(Outcome::Good)
     }

@@ -151,7 +151,9 @@ def check_import(*, python: str) -> None:
 def fetch(*, cache: Path, requirements: str) -> Path:
     """Installs Blender unless it is installed, and returns the Python that has it."""
     folder = cache / "blender"
-    if not is_installed(folder=folder, requirements=requirements):
+    if is_installed(folder=folder, requirements=requirements):
+        print(f"already present: Blender 4.5 in '{folder}'", file=sys.stderr)
+    else:
         install(folder=folder, requirements=requirements)
     python = folder / "bin" / "python"
     try:

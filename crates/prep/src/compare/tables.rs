@@ -1,17 +1,23 @@
 //! Shows the comparison as tables, whose numbers are rounded while the JSON has all digits.
 
-use mateval_dataset::progress::{Table, row};
+use mateval_dataset::progress::{Table, fitted, row};
 use mateval_files::untrusted;
 
 use super::file::{Check, CompareFile, LightComparison, Quantity, SceneComparison, State, ViewComparison};
 
-/// The tables, then every check that does not agree, then the verdict.
-pub fn text(file: &CompareFile) -> String {
+/// The tables, then every check that does not agree, then the verdict, for a terminal of `columns`; of any width if
+/// absent.
+pub fn text(file: &CompareFile, columns: Option<usize>) -> String {
     let tables =
-        [geometry(file), light(file), apart(file), source_materials(file)].map(|table| table.text()).join("\n");
+        [geometry(file), light(file), apart(file), source_materials(file)].map(|table| table.text(columns)).join("\n");
     let faults: String = faults(file).iter().map(|fault| format!("{fault}\n")).collect();
     let gap = if faults.is_empty() { "" } else { "\n" };
-    format!("{tables}{gap}{faults}\n{}\n", verdict(file))
+    let rest = format!("{gap}{faults}\n{}\n", verdict(file));
+    tables
+        + &match columns {
+            Some(columns) => fitted(&rest, columns),
+            None => rest,
+        }
 }
 
 /// One line for every check that does not agree.

@@ -25,14 +25,13 @@ use mateval_tracer::World;
 use crate::error::PrepError;
 use crate::scene_meshes::{self, Faults, Meshes};
 use crate::views::{ViewScene, note_nearest, unseen_share, write_geometry, write_parts};
-pub use motion::most_level;
 use motion::{Amount, Motion, amounts, crossing};
 
 /// What to do with the furniture of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct PerturbOptions {
     pub kind: PerturbationKind,
-    /// The level, at most [`most_level`]; 0 changes nothing.
+    /// The level, at most [`PerturbationKind::most_level`]; 0 changes nothing.
     pub level: u32,
     /// The seed of directions.
     pub seed: u64,
@@ -47,7 +46,7 @@ pub fn perturb(
     progress: Progress<'_>,
 ) -> Result<Vec<PerturbedScene>, PrepError> {
     // What can be refused early.
-    let most = most_level(options.kind);
+    let most = options.kind.most_level();
     if options.level > most {
         return Err(PrepError::NoSuchLevel { kind: options.kind, found: options.level, most });
     }

@@ -39,11 +39,6 @@ pub(super) fn amounts(kind: PerturbationKind) -> &'static [Amount] {
     }
 }
 
-/// The highest level of a kind.
-pub fn most_level(kind: PerturbationKind) -> u32 {
-    amounts(kind).len() as u32
-}
-
 /// The wavelength of the noise that bends surfaces, in metres.
 const WAVELENGTH_M: f64 = 0.4;
 
@@ -212,6 +207,7 @@ mod tests {
     #[test]
     fn levels_are_distances_that_grow() {
         for kind in PerturbationKind::ALL {
+            assert_eq!(amounts(kind).len() as u32, kind.most_level());
             let mut last = 0.0;
             for amount in amounts(kind) {
                 let moved: f64 = ways(&motion(*amount, 7, "chair")).iter().map(|way| way.length()).sum();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use mateval_dataset::{PartSetId, SceneId, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::BelowError;
-use mateval_files::untrusted::shortened;
+use mateval_files::untrusted::{in_words, shortened};
 
 /// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers
 /// are centimetres apart.
@@ -18,8 +18,12 @@ pub const ATLAS_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 #[derive(Debug, thiserror::Error)]
 pub enum RecipeFault {
     /// The file is not TOML, or has other keys or types than a recipe.
-    #[error("{}", .0.to_string().trim_end())]
+    #[error("{}", in_words(.0.to_string().trim_end()))]
     Syntax(Box<toml::de::Error>),
+    #[error("name = {found:?}: expected a name of at least one letter, without control characters")]
+    Name { found: String },
+    #[error("version = {found:?}: expected a version such as `0.1.0`, without control characters")]
+    Version { found: String },
     #[error("it has no scene; add a [[scene]] with `id` and the key of a source")]
     NoScenes,
     #[error("samples = {found}: expected 1 to {most}")]

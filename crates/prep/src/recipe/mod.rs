@@ -81,6 +81,13 @@ pub fn read(path: &Path) -> Result<(Recipe, String), PrepError> {
 impl Recipe {
     fn faults(&self) -> Vec<RecipeFault> {
         let mut faults = Vec::new();
+        let is_shown = |text: &str| !text.trim().is_empty() && !text.chars().any(char::is_control);
+        if !is_shown(&self.name) {
+            faults.push(RecipeFault::Name { found: self.name.clone() });
+        }
+        if !is_shown(&self.version) {
+            faults.push(RecipeFault::Version { found: self.version.clone() });
+        }
         if self.scenes.is_empty() {
             faults.push(RecipeFault::NoScenes);
         }
@@ -317,10 +324,18 @@ mod tests {
 
     #[test]
     fn all_faults_are_reported_together() {
-        let text = "name = 'x'\nresolution = [4, 9]\nsamples = 0\n\
+        let text = "name = ' '\nversion = ''\nresolution = [4, 9]\nsamples = 0\n\
         [[scene]]\nid = 'a'\nbitterli = 'a'\nexposure = 0.0\n[[scene]]\nid = 'a'\nbitterli = 'b'\natlas_size = 9";
         let error = recipe_of(text).unwrap_err().to_string();
-        for part in ["resolution = [4, 9]", "samples = 0", "'a' is listed twice", "exposure = 0", "atlas_size = 9"] {
+        for part in [
+            "name = \" \"",
+            "version = \"\"",
+            "resolution = [4, 9]",
+            "samples = 0",
+            "'a' is listed twice",
+            "exposure = 0",
+            "atlas_size = 9",
+        ] {
             assert!(error.contains(part), "{part} not in {error}");
         }
     }

@@ -479,7 +479,7 @@ mod tests {
     /// Table I has the paper's headings and rounds as the paper does.
     #[test]
     fn table_one_comes_first() {
-        let text = text(&counted(&hand_made()));
+        let text = text(&counted(&hand_made()), None);
         let expected = "Table I of the paper, for hand-made 1.0
                               min  max  scenes
   Number of scenes         3
@@ -508,7 +508,7 @@ mod tests {
     fn an_empty_dataset_has_no_mean() {
         let stats = counted(&dataset(Vec::new()));
         assert_eq!((stats.scenes, stats.objects_per_scene, stats.total.super_categories[0].share), (0, None, None));
-        assert!(text(&stats).contains("Avg. Objects/Scene     unknown"));
+        assert!(text(&stats, None).contains("Avg. Objects/Scene     unknown"));
         roxmltree::Document::parse(&picture(&stats)).unwrap();
     }
 
@@ -574,7 +574,7 @@ mod tests {
             texts.iter().any(|text| text.starts_with("</text><script>alert(1)</script> & \"quoted\"")),
             "{texts:?}"
         );
-        let tables = text(&stats);
+        let tables = text(&stats, None);
         assert!(!tables.contains(['\u{1b}', '\0', '\u{202e}']), "{tables:?}");
         // The twin: without escaping, such a name breaks the XML.
         assert!(roxmltree::Document::parse(&format!("<text>{hostile}</text>")).is_err());

@@ -20,8 +20,8 @@ const LONGEST_CELL: usize = 60;
 /// Headings of the columns of the eight super-categories, in their order.
 const HEADS: [&str; 8] = ["cabinet", "sofa", "lighting", "chair", "others", "bed", "table", "stool"];
 
-/// All tables. Table I comes first, with the paper's headings.
-pub fn text(stats: &StatsFile) -> String {
+/// All tables, for a terminal of `columns`; of any width if absent. Table I comes first, with the paper's headings.
+pub fn text(stats: &StatsFile, columns: Option<usize>) -> String {
     let tables = [
         table_one(stats),
         beside(stats),
@@ -31,7 +31,7 @@ pub fn text(stats: &StatsFile) -> String {
         scenes(stats),
         scenes_by_super_category(stats),
     ];
-    tables.map(|table| table.text()).join("\n")
+    tables.map(|table| table.text(columns)).join("\n")
 }
 
 fn table_one(stats: &StatsFile) -> Table {

@@ -34,13 +34,14 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepE
     let mut faults = Faults::default();
     progress(Report::step("hashes", 0, 1));
     for scene in BuildFolder::of(root).changed() {
+        let command = manifest::finishing_command(root, std::slice::from_ref(&scene));
         faults.all.push(Finding::new(
             Severity::Error,
             "unfinished",
             format!("scenes/{scene}"),
             "",
             "the scene was made or rendered apart since the manifest was written",
-            "run `mateval prep finish`",
+            format!("run `{command}`"),
         ));
     }
     check_schema::<DatasetFile>(root, DATASET, &mut faults);

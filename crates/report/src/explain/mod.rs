@@ -589,7 +589,7 @@ mod tests {
             light: Vec::new(),
             findings: Vec::new(),
         };
-        let plain = text::plain(&file);
+        let plain = text::plain(&file, None);
         assert!(
             plain.starts_with("m, scene s: albedo MSE 10.000 (1e-3, linear), PSNR 20.00 dB, over 12 pixels in 1 views")
         );

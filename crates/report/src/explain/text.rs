@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mateval_dataset::ViewId;
-use mateval_dataset::progress::Table;
+use mateval_dataset::progress::{Table, fitted, wrapped};
 
 use mateval_eval::metric::PictureKind;
 use mateval_eval::result::key::Views;
@@ -26,13 +26,20 @@ the rest, each step removes its share from the error that the steps before it le
 one scale for each instance; one for each channel (chroma); a smooth factor in each view (shading left in the albedo); a
 shift of up to 4 pixels (misplacement); detail of the truth that the prediction lacks (blur). No step removes the rest.";
 
-/// The explanation as text, with aligned tables.
-pub fn plain(file: &ExplainFile) -> String {
-    let tables = tables(file).iter().map(Table::text).collect::<Vec<_>>();
-    let mut parts = vec![format!("{}\n{}", title(file), hidden(file))];
-    parts.extend(tables);
-    parts.push(format!("{KINDS}\n"));
-    parts.extend(findings(file));
+/// The explanation as text, with aligned tables, for a terminal of `columns`; of any width if absent.
+pub fn plain(file: &ExplainFile, columns: Option<usize>) -> String {
+    let fit = |text: String| match columns {
+        Some(columns) => fitted(&text, columns),
+        None => text,
+    };
+    let mut parts = vec![fit(format!("{}\n{}", title(file), hidden(file)))];
+    parts.extend(tables(file).iter().map(|table| table.text(columns)));
+    // One paragraph where its own lines do not fit.
+    let is_fit = columns.is_none_or(|columns| KINDS.lines().all(|line| line.chars().count() <= columns));
+    let paragraph = |columns| wrapped(KINDS.split_whitespace(), "", "", columns).join("\n");
+    let kinds = columns.filter(|_| !is_fit).map_or_else(|| KINDS.to_owned(), paragraph);
+    parts.push(format!("{kinds}\n"));
+    parts.extend(findings(file).map(fit));
     parts.join("\n")
 }
 

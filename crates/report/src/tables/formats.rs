@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use mateval_dataset::progress::{blocks, fitted};
 use mateval_eval::metric::Better;
 
 use super::table::{Cell, Column, Table};
@@ -135,10 +136,12 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("\"{guard}{}\"", text.replace('"', "\"\""))
 }
 
-/// Aligned text for a terminal of 80 columns: a heading and the table. Standard errors are left out, since they make
-/// rows longer than a line. With `bold` the best value of each column is bold.
-pub(super) fn aligned(table: &Table<'_>, bold: bool) -> String {
-    let mut text = format!("{}\n\n", table.title);
+/// Aligned text: a heading and the table. Standard errors are left out, since they make rows longer than a line. With
+/// `bold` the best value of each column is bold. Of a table that is wider than `columns`, the columns of values stand in
+/// several blocks below each other.
+pub(super) fn aligned(table: &Table<'_>, bold: bool, columns: Option<usize>) -> String {
+    let title = columns.map_or_else(|| table.title.to_owned(), |columns| fitted(table.title, columns));
+    let mut text = format!("{title}\n\n");
     let names: Vec<Vec<String>> = table
         .groups
         .iter()
@@ -163,28 +166,34 @@ pub(super) fn aligned(table: &Table<'_>, bold: bool) -> String {
             cells.chain(heads[at].iter().map(|line| width(line))).max().unwrap_or(0)
         })
         .collect();
+    let of_names = name_widths.iter().sum::<usize>() + GAP.len() * (name_widths.len() - 1);
+    let all = 0..widths.len();
+    let blocks = columns.map_or_else(|| vec![all], |columns| blocks(&widths, columns.saturating_sub(of_names)));
     // Heads stand on the line above the values, however many lines each has.
     let height = heads.iter().map(Vec::len).max().unwrap_or(0);
-    for line in 0..height {
-        let names = name_heads.iter().zip(&name_widths).map(|(head, width)| {
-            let head = if line + 1 == height { head } else { "" };
-            format!("{head:<width$}")
-        });
-        let values = heads.iter().zip(&widths).map(|(head, width)| {
-            let from_bottom = height - line;
-            let word = head.len().checked_sub(from_bottom).map_or("", |at| head[at].as_str());
-            format!("{word:>width$}")
-        });
-        push_line(&mut text, names.chain(values));
-    }
-    // The rows: names to the left, values to the right.
-    for (row, row_names) in names.iter().enumerate() {
-        let names = row_names.iter().zip(&name_widths).map(|(name, &wide)| padded(name, name, wide, false));
-        let values = widths.iter().enumerate().map(|(at, &wide)| {
-            let marked = rows[row][at].value_text(if bold { BOLD } else { ("", "") });
-            padded(&plain(row, at), &marked, wide, true)
-        });
-        push_line(&mut text, names.chain(values));
+    for (at, block) in blocks.into_iter().enumerate() {
+        text.push_str(if at > 0 { "\n" } else { "" });
+        for line in 0..height {
+            let names = name_heads.iter().zip(&name_widths).map(|(head, width)| {
+                let head = if line + 1 == height { head } else { "" };
+                format!("{head:<width$}")
+            });
+            let values = heads.iter().zip(&widths).map(|(head, width)| {
+                let from_bottom = height - line;
+                let word = head.len().checked_sub(from_bottom).map_or("", |at| head[at].as_str());
+                format!("{word:>width$}")
+            });
+            push_line(&mut text, names.chain(values.skip(block.start).take(block.len())));
+        }
+        // The rows: names to the left, values to the right.
+        for (row, row_names) in names.iter().enumerate() {
+            let names = row_names.iter().zip(&name_widths).map(|(name, &wide)| padded(name, name, wide, false));
+            let values = block.clone().map(|at| {
+                let marked = rows[row][at].value_text(if bold { BOLD } else { ("", "") });
+                padded(&plain(row, at), &marked, widths[at], true)
+            });
+            push_line(&mut text, names.chain(values));
+        }
     }
     text
 }
@@ -218,37 +227,4 @@ fn padded(plain: &str, marked: &str, wide: usize, right: bool) -> String {
 fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {
     text.push_str(cells.collect::<Vec<_>>().join(GAP).trim_end());
     text.push('\n');
-}
-
-/// Lines of at most this many columns, broken between words; a word that is wider has a line of its own. `first` begins
-/// the first line and `next` the others.
-pub fn wrapped<'a>(words: impl IntoIterator<Item = &'a str>, first: &str, next: &str, columns: usize) -> Vec<String> {
-    let (mut lines, mut line, mut is_empty) = (Vec::new(), first.to_owned(), true);
-    for word in words {
-        if !is_empty && width(&line) + 1 + width(word) > columns {
-            lines.push(std::mem::replace(&mut line, next.to_owned()));
-            is_empty = true;
-        }
-        if !is_empty {
-            line.push(' ');
-        }
-        line.push_str(word);
-        is_empty = false;
-    }
-    lines.push(line);
-    lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_break_between_words_and_nowhere_else() {
-        let lines = |words: &[&str]| wrapped(words.iter().copied(), "- ", "  ", 8);
-        assert_eq!(lines(&["one", "two", "three"]), ["- one", "  two", "  three"]);
-        assert_eq!(lines(&["a", "b", "c", "d"]), ["- a b c", "  d"]);
-        assert_eq!(lines(&["a b c d", "e"]), ["- a b c d", "  e"]);
-        assert_eq!(lines(&[]), ["- "]);
-    }
 }

@@ -11,7 +11,6 @@ mod table;
 mod tests;
 
 pub(crate) use formats::quoted;
-pub use formats::wrapped;
 pub use layouts::Grouping;
 pub(crate) use layouts::{CellKey, Value};
 pub(crate) use table::pooled;
@@ -28,8 +27,13 @@ pub enum TableFormat {
     Latex,
     /// Comma-separated values with all digits and without marks; standard errors have columns of their own.
     Csv,
-    /// Aligned text without standard errors; best bold on a terminal, by ANSI escape sequences.
-    Text { bold: bool },
+    /// Aligned text without standard errors.
+    Text {
+        /// The best value bold, by ANSI escape sequences.
+        bold: bool,
+        /// Columns of the terminal that lines must not exceed; any if absent.
+        columns: Option<usize>,
+    },
 }
 
 /// Puts the results side by side under one protocol. Results with different fingerprints or scenes are refused. A
@@ -79,7 +83,7 @@ fn filled(
             TableFormat::Markdown => formats::markdown(&table),
             TableFormat::Latex => formats::latex(&table),
             TableFormat::Csv => formats::csv(&table),
-            TableFormat::Text { bold } => formats::aligned(&table, bold),
+            TableFormat::Text { bold, columns } => formats::aligned(&table, bold, columns),
         })
         .collect();
     if texts.is_empty() {

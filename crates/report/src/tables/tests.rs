@@ -106,22 +106,26 @@ a|1      10.00   0.5000   100.000
 b_2      40.00  missing    25.000
 c\"3      20.00   0.5000    50.000
 ";
-    let text = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: false });
+    let text = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: false, columns: None });
     assert_eq!(text, expected);
-    let bold = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: true });
+    let bold = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: true, columns: None });
     assert!(bold.contains("\x1b[1m40.00\x1b[0m"), "{bold}");
     assert_eq!(bold.replace("\x1b[1m", "").replace("\x1b[0m", ""), text);
 
     let two = result("a", &[("albedo.input.mse", 0.01), ("rgb_true.input.mse", 0.01)]);
-    let text = shown(&[two], Grouping::Dataset, TableFormat::Text { bold: false });
+    let text = shown(&[two], Grouping::Dataset, TableFormat::Text { bold: false, columns: None });
     assert_eq!(text.lines().filter(|line| line.is_empty()).count(), 3, "two below titles, one between tables: {text}");
 
     let scores =
         ["albedo", "rgb_true", "rgb_relit"].map(|kind| [format!("{kind}.input.psnr"), format!("{kind}.novel.psnr")]);
     let all: Vec<(&str, f64)> = scores.as_flattened().iter().map(|key| (key.as_str(), 12.345)).collect();
     let wide = result("a-method-with-a-name", &all);
-    let text = headline(&[wide], None, "paper", TableFormat::Text { bold: false }).unwrap();
+    let text = headline(&[wide], None, "paper", TableFormat::Text { bold: false, columns: None }).unwrap();
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    let narrow = headline(&[wide], None, "paper", TableFormat::Text { bold: false, columns: Some(60) }).unwrap();
+    assert!(narrow.lines().all(|line| line.chars().count() <= 60), "{narrow}");
+    let blocks = [&narrow, &text].map(|text| text.matches("a-method-with-a-name").count());
+    assert_eq!((blocks, narrow.matches("12.35").count() + narrow.matches("12.34").count()), ([2, 1], 6), "{narrow}");
 }
 
 #[test]

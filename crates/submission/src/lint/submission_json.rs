@@ -4,11 +4,10 @@
 use std::path::Path;
 
 use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_dataset::{Finding, Severity};
-use mateval_files::untrusted::{hint, shortened, without_mark};
+use mateval_dataset::{Finding, SceneError, Severity, json};
+use mateval_files::untrusted::{hint, nearest, shortened, without_mark};
 use serde_json::{Map, Value};
 
-use super::folder::nearest;
 use crate::error::{FileFault, error, finding, warning};
 use crate::files::{SubmittedFile, exists};
 
@@ -31,15 +30,17 @@ const LONGEST_METHOD_NAME: usize = 100;
 /// The method's name, if it has one, and every fault. `manifest_sha256` is that of the dataset to compare with.
 pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<Finding>) {
     match read(submission) {
-        Ok(object) => {
+        Ok((object, mut findings)) => {
             let method = object.get("method").and_then(Value::as_str).map(str::to_owned);
-            (method, check_object(object, manifest_sha256))
+            findings.extend(check_object(object, manifest_sha256));
+            (method, findings)
         }
         Err(finding) => (None, vec![*finding]),
     }
 }
 
-fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
+/// The object, and a finding for each of its numbers that is out of range.
+fn read(submission: &Path) -> Result<(Map<String, Value>, Vec<Finding>), Box<Finding>> {
     let path = submission.join(SUBMISSION);
     let fault = |code: &str, message: String, action: &str| Box::new(error(code, SUBMISSION, message, action));
     if !exists(&path) {
@@ -67,9 +68,16 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
     };
     match serde_json::from_slice(bytes).map_err(bad)? {
         // Parsing the type finds what the parsed object no longer shows, such as a key that occurs twice.
-        Value::Object(object) => match serde_json::from_slice::<SubmissionFile>(bytes) {
-            Err(found) if is_sound(&object) => Err(bad(found)),
-            _ => Ok(object),
+        // Below its keys, and where a key occurs twice, parsing the type finds the fault and its place.
+        Value::Object(object) => match json::parse::<SubmissionFile>(&path, bytes) {
+            Err(SceneError::Invalid { mut findings, .. }) if is_sound(&object) && !findings.is_empty() => {
+                Err(Box::new(Finding {
+                    action: "write it as FORMAT.md, section 11, states".to_owned(),
+                    ..findings.remove(0)
+                }))
+            }
+            Ok(file) => Ok((object, file.numbers_out_of_range())),
+            Err(_) => Ok((object, Vec::new())),
         },
         other => Err(fault("wrong_type", format!("expected an object, found {}", kind(&other)), "write { ... }")),
     }
@@ -219,12 +227,12 @@ mod tests {
     use mateval_dataset::submission::StoredEncoding;
     use serde_json::json;
 
-    /// The codes of what is found in a folder with this `submission.json`.
+    /// The codes and places of what is found in a folder with this `submission.json`.
     fn codes(file: &Value) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(SUBMISSION), file.to_string()).unwrap();
         let (_, findings) = check(folder.path(), &"0".repeat(64));
-        findings.into_iter().map(|finding| finding.code).collect()
+        findings.into_iter().map(|finding| format!("{} {}", finding.code, finding.place)).collect()
     }
 
     #[test]
@@ -257,9 +265,15 @@ mod tests {
         assert_eq!(codes(&whole), [""; 0]);
         // The twins: another type, and an object that lacks a key.
         for (key, value, expected) in [
-            ("url", json!(3), "wrong_type"),
-            ("cost", json!("cheap"), "wrong_type"),
-            ("cost", json!({"hardware": "a laptop"}), "bad_json"),
+            ("url", json!(3), "wrong_type /url"),
+            ("cost", json!("cheap"), "wrong_type /cost"),
+            ("cost", json!({"hardware": "a laptop"}), "bad_json /cost"),
+            ("cost", json!({"seconds_a_scene": -1}), "out_of_range /cost/seconds_a_scene"),
+            ("cost", json!({"seconds_a_scene": null}), "bad_json /cost/seconds_a_scene"),
+            ("geometry", json!({"kind": "scale", "level": 3}), "out_of_range /geometry/level"),
+            ("geometry", json!({"kind": "pose", "level": 0}), "out_of_range /geometry/level"),
+            ("geometry", json!({"kind": "posed", "level": 1}), "bad_json /geometry/kind"),
+            ("assumed_encodings", json!({"roughness": "sRGB"}), "bad_json /assumed_encodings/roughness"),
         ] {
             let mut changed = whole.clone();
             changed[key] = value;
