@@ -255,6 +255,8 @@ fn other_materials_do_not_decide_and_noise_does_not_pass() {
     }
     let states: Vec<State> = file.checks().map(|(_, _, check)| check.state).collect();
     assert!(states.iter().all(|state| matches!(state, State::Agrees | State::TooNoisy)), "{states:?}");
+    let narrow = mateval_prep::compare::tables::text(&file, Some(80));
+    assert!(narrow.lines().all(|line| line.chars().count() <= 80), "{narrow}");
     let state = |picture, quantity| scene.views[0].check(picture, quantity).unwrap().state;
     assert_eq!(state("rgb", Quantity::TilesOver), State::Agrees);
     assert_eq!(state("group_00", Quantity::MeanDifference), State::TooNoisy);
@@ -266,6 +268,7 @@ fn what_cannot_be_compared() {
     let nothing = "has no pictures by blender of scene 'room'; run `mateval prep render DATASET --renderer blender`";
     run(&mut compare(dataset(), 1)).ends_with(2).says(nothing);
     run(compare(dataset(), 1).args(["--scene", "attic"])).ends_with(2).says("has no scene 'attic'");
+    run(compare(dataset(), 1).args(["--scene", "Room"])).ends_with(2).says("tip: did you mean 'room'?");
     let copy = copied(&LAMBERT);
     for inside in ["page", "scenes/page", "scenes/new/page"] {
         let out = copy.path().join(inside);

@@ -496,6 +496,28 @@ mod tests {
         assert!(unfinished.exists(), "its owner lives");
     }
 
+    /// `prep finish` refuses half a render, so its advice and that of the readers must not be each other.
+    #[test]
+    fn an_interrupted_render_is_resumed_by_one_command() {
+        let (root, id) = scene_with(&[("a", "1"), ("ground_truth/renders/builtin/input/rgb.exr", "2")]);
+        let shown = root.path().display();
+        let mut hashes = SceneHashes::empty(root.path(), &id);
+        hashes.update().unwrap();
+        assert!(unfinished(root.path(), |_| true).is_none());
+        BuildFolder::of(root.path()).note_change(&id).unwrap();
+        let advice = || unfinished(root.path(), |_| true).unwrap().to_string();
+        assert!(
+            advice().ends_with(&format!("changed since its manifest was written; run `mateval prep finish {shown}`"))
+        );
+        let half = root.path().join("scenes/room/ground_truth/renders/blender/input");
+        std::fs::create_dir_all(&half).unwrap();
+        std::fs::write(half.join("rgb_a.exr"), "3").unwrap();
+        let command = format!("`mateval prep render {shown} --renderer blender`");
+        assert!(advice().ends_with(&format!("run {command}")), "{}", advice());
+        let action = hashes.check(|_| true).unwrap().remove(0).action;
+        assert!(action.contains(&command), "{action}");
+    }
+
     /// The list of a scene that the manifest describes too must not hide another dataset that was unpacked over this
     /// one.
     #[test]

@@ -65,7 +65,7 @@ impl SubmissionFile {
     /// A finding for each number that has no meaning, which would stand in tables and curves.
     pub fn numbers_out_of_range(&self) -> Vec<Finding> {
         let found = |place: &str, message: String, action: &str| {
-            Finding::new(Severity::Error, "out_of_range", SUBMISSION, place, message, action)
+            Finding::new(Severity::Error, "bad_number", SUBMISSION, place, message, action)
         };
         // JSON has neither NaN nor infinities.
         let cost = self.cost.as_ref().filter(|cost| cost.seconds_a_scene < 0.0).map(|cost| {

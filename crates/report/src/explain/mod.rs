@@ -597,6 +597,10 @@ mod tests {
         let first =
             "25.0 % of the squared error lies in the 25.0 % of the pixels whose surface the photo does not show.";
         assert_eq!(plain.lines().nth(1), Some(first));
+        let narrow = text::plain(&file, Some(80));
+        assert!(narrow.lines().all(|line| line.chars().count() <= 80), "{narrow}");
+        let words = |text: &str| text.split_whitespace().count();
+        assert!(words(&narrow) >= words(&plain), "{narrow}");
         let page = text::markdown(&file, &[]);
         let row = "| (whole scene) |  | 100.0 | 12 | 10.000 | 25.0 | 25.0 | 25.0 | 12.5 | 12.5 | 0.0 | 0.0 |\n";
         assert!(page.contains(row), "{page}");

@@ -268,12 +268,12 @@ mod tests {
             ("url", json!(3), "wrong_type /url"),
             ("cost", json!("cheap"), "wrong_type /cost"),
             ("cost", json!({"hardware": "a laptop"}), "bad_json /cost"),
-            ("cost", json!({"seconds_a_scene": -1}), "out_of_range /cost/seconds_a_scene"),
+            ("cost", json!({"seconds_a_scene": -1}), "bad_number /cost/seconds_a_scene"),
             ("cost", json!({"seconds_a_scene": null}), "bad_json /cost/seconds_a_scene"),
-            ("geometry", json!({"kind": "scale", "level": 3}), "out_of_range /geometry/level"),
-            ("geometry", json!({"kind": "pose", "level": 0}), "out_of_range /geometry/level"),
+            ("geometry", json!({"kind": "scale", "level": 3}), "bad_number /geometry/level"),
+            ("geometry", json!({"kind": "pose", "level": 0}), "bad_number /geometry/level"),
             ("geometry", json!({"kind": "posed", "level": 1}), "bad_json /geometry/kind"),
-            ("assumed_encodings", json!({"roughness": "sRGB"}), "bad_json /assumed_encodings/roughness"),
+            ("assumed_encodings", json!({"roughness": "sRGB"}), "bad_json /assumed_encodings"),
         ] {
             let mut changed = whole.clone();
             changed[key] = value;

@@ -199,6 +199,7 @@ const NAME_FAULTS: &[Fault] = &[
     ("missing_key", ERROR, |root| edit_json(root, "\"method\": \"gt\",", "")),
     ("unknown_key", ERROR, |root| set(root, "autor", "me".into())),
     ("wrong_format", ERROR, |root| set(root, "format", "mateval-submission/9".into())),
+    ("bad_number", ERROR, |root| set(root, "cost", serde_json::json!({"seconds_a_scene": -1.0}))),
     ("json_too_large", ERROR, |root| set(root, "description", "x".repeat(2 << 20).into())),
     ("other_dataset", WARNING, |root| set(root, "dataset_manifest_sha256", "0".repeat(64).into())),
     ("bad_hash", WARNING, |root| set(root, "dataset_manifest_sha256", "latest".into())),
