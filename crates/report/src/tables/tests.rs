@@ -120,7 +120,8 @@ c\"3      20.00   0.5000    50.000
         ["albedo", "rgb_true", "rgb_relit"].map(|kind| [format!("{kind}.input.psnr"), format!("{kind}.novel.psnr")]);
     let all: Vec<(&str, f64)> = scores.as_flattened().iter().map(|key| (key.as_str(), 12.345)).collect();
     let wide = result("a-method-with-a-name", &all);
-    let text = headline(&[wide], None, "paper", TableFormat::Text { bold: false, columns: None }).unwrap();
+    let text =
+        headline(std::slice::from_ref(&wide), None, "paper", TableFormat::Text { bold: false, columns: None }).unwrap();
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     let narrow = headline(&[wide], None, "paper", TableFormat::Text { bold: false, columns: Some(60) }).unwrap();
     assert!(narrow.lines().all(|line| line.chars().count() <= 60), "{narrow}");
