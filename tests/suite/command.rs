@@ -73,10 +73,16 @@ pub fn build(recipe: &Path, dataset: &Path) -> Command {
     command
 }
 
-/// `mateval prep render DATASET --samples SAMPLES`, with references of few samples.
+/// `mateval prep render DATASET --samples SAMPLES`, with references that only have to exist.
 pub fn render(dataset: &Path, samples: u32) -> Command {
+    render_for_scores(dataset, samples, 2)
+}
+
+/// The same with so many samples of the references that scores under light can be compared.
+pub fn render_for_scores(dataset: &Path, samples: u32, references: u32) -> Command {
     let mut command = mateval();
-    command.args(["prep", "render", "--samples", &samples.to_string(), "--scorer-samples", "16"]).arg(dataset);
+    let [samples, references] = [samples, references].map(|number| number.to_string());
+    command.args(["prep", "render", "--samples", &samples, "--scorer-samples", &references]).arg(dataset);
     command
 }
 

@@ -120,7 +120,7 @@ fn the_report_states_what_the_release_is() {
     assert!(file.scenes[0].costs.iter().all(|cost| cost.wall_seconds > 0.0 && cost.cpu_seconds.unwrap() > 0.0));
     assert_eq!(
         file.remake.commands[1],
-        "mateval prep render DATASET --renderer builtin --samples 1 --scorer-samples 16"
+        "mateval prep render DATASET --renderer builtin --samples 1 --scorer-samples 2"
     );
     // What was not given is stated, with the way to give it.
     for text in ["The ceiling is not given", "--floor grey.json", "<h2 id=\"cite\">", "184", "13.2"] {

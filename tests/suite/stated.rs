@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::command::{baseline, build, render, run, run_words, score, verify};
+use super::command::{baseline, build, render_for_scores, run, run_words, score, verify};
 use super::sample::json;
 use mateval_testkit::{copy_folder, kept_folder};
 
@@ -22,7 +22,7 @@ static STATED: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
     std::fs::write(&info, text.replace("\"Solid Wood\"", "\"Metal\"")).unwrap();
     let recipe = recipe(&folder, "appearance = \"stated\", appearance_seed = 5");
     run(build(&recipe, &dataset).arg("--source").arg(&source)).ends_with(0);
-    run(&mut render(&dataset, 16)).ends_with(0);
+    run(&mut render_for_scores(&dataset, 16, 16)).ends_with(0);
     [source, dataset]
 });
 

@@ -11,7 +11,7 @@ use mateval_image::{exr_io, png_io};
 use mateval_testkit::kept_folder;
 use serde_json::Value;
 
-use super::command::{baseline, build, render, run, run_words, verify};
+use super::command::{baseline, build, render_for_scores, run, run_words, verify};
 use super::sample::{json, write_source};
 
 const HEAD: &str = "resolution = [64, 48]\natlas_size = 128\nviews = [{ id = \"up_left\", x_deg = 5, y_deg = 5 }]\n";
@@ -23,7 +23,7 @@ static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
     for (name, head) in [("plain", HEAD.to_owned()), ("wide", format!("{HEAD}{WIDE}"))] {
         let dataset = folder.join(name);
         run(&mut build(&write_source(&folder.join(format!("source-{name}")), &head, &["room"]), &dataset)).ends_with(0);
-        run(&mut render(&dataset, 8)).ends_with(0);
+        run(&mut render_for_scores(&dataset, 8, 16)).ends_with(0);
         for method in ["gt", "nn"] {
             let submission = folder.join(format!("{name}-{method}"));
             run(&mut baseline(method, &dataset, &submission)).ends_with(0);

@@ -105,7 +105,8 @@ const STEPS: u8 = 6;
 /// Samples per pixel of each half of the leaderboard's lit pictures: with fewer, the filter that takes out their noise
 /// would blur what the prediction adds to the reference.
 const SHOWN_SAMPLES: u32 = 16;
-/// Samples per pixel of each half of the scorer's reference: fewer than a release has, as befits its small views.
+/// Samples per pixel of each half of the scorer's reference: fewer than a release has, as befits its small views. A demo
+/// with few samples has at most twice as many here.
 const REFERENCE_SAMPLES: u32 = 32;
 /// Width and height of a view: large enough to look at, and rendered in seconds.
 const SMALL: [u32; 2] = [160, 120];
@@ -322,7 +323,8 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
         let failed = counted(report.failures.len(), "scene");
         bail!("{failed} could not be rendered; run the demo again to go on from here");
     }
-    let reference_options = ReferenceOptions { samples: REFERENCE_SAMPLES, scenes: Vec::new(), force: false };
+    let reference_options =
+        ReferenceOptions { samples: REFERENCE_SAMPLES.min(2 * options.samples), scenes: Vec::new(), force: false };
     let references = with_progress(|progress| make_references(&places.dataset, &reference_options, progress))
         .context("cannot render the scorer's references")?;
     if references.rendered > 0 {

@@ -36,19 +36,8 @@ pub enum EvalError {
     )]
     ReferenceSamples { scene: SceneId, found: u32, wanted: u32 },
     /// A result states a number that does not follow from the others in it.
-    #[error(
-        "'{}': at {place} it states {said}, but its own numbers give {found}: {} was changed by hand; write the result again: \
-         mateval eval score SUBMISSION --dataset DATASET --out '{}' --force",
-        path.display(), one_of(changed), path.display()
-    )]
-    Contradiction {
-        path: PathBuf,
-        place: String,
-        said: String,
-        found: String,
-        /// The places of the numbers of which one was changed.
-        changed: Vec<String>,
-    },
+    #[error("'{}': at {place} it states {said}, but its own numbers give {found}; it was changed by hand", path.display())]
+    Contradiction { path: PathBuf, place: String, said: String, found: String },
     #[error("the dataset '{}' has no renders; run `mateval prep render DATASET`", dataset.display())]
     NoPhotoRenderer { dataset: PathBuf },
     /// The scene has a photo from elsewhere, so it has no renders.
@@ -101,14 +90,6 @@ impl EvalError {
     pub(crate) fn no_input_view(scene: &SceneId) -> Self {
         let [expected, found] = ["an input view", "none"].map(str::to_owned);
         Self::Unsound { place: format!("scene '{scene}'"), expected, found }
-    }
-}
-
-/// What a message shows of the places of which one is meant.
-fn one_of(places: &[String]) -> String {
-    match places {
-        [place] => place.clone(),
-        _ => format!("one of {}", places.join(", ")),
     }
 }
 

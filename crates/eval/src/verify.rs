@@ -19,7 +19,7 @@ use crate::metric::{LPIPS_NET, Metric};
 use crate::protocol::Protocol;
 use crate::result::key::ResultKey;
 use crate::result::means::{means, summary_noise};
-use crate::result::{MissingNumbers, PictureValues, ProtocolResult, RESULT_FORMAT, ResultFile};
+use crate::result::{MissingNumbers, RESULT_FORMAT, ResultFile};
 use crate::score::{LpipsWeights, ScorePlan, score};
 
 pub const VERIFICATION_FORMAT: &str = "mateval-verification/1";
@@ -177,51 +177,26 @@ impl ResultFile {
         let result: Self = json::read_format(path, RESULT_FORMAT)?;
         match result.contradiction() {
             None => Ok(result),
-            Some((Difference { place, said, found }, changed)) => {
-                Err(EvalError::Contradiction { path: path.to_owned(), place, said, found, changed })
+            Some(Difference { place, said, found }) => {
+                Err(EvalError::Contradiction { path: path.to_owned(), place, said, found })
             }
         }
     }
 
-    /// The first mean that does not follow from the numbers below it: pictures to scenes, scenes to the summary. With
-    /// the places of the numbers of which one was changed.
-    fn contradiction(&self) -> Option<(Difference, Vec<String>)> {
+    /// The first mean that does not follow from the numbers below it: pictures to scenes, scenes to the summary.
+    fn contradiction(&self) -> Option<Difference> {
         for (name, scores) in &self.protocols {
             let (scenes, summary) = means(&scores.pictures, &scores.texels);
             let noise = summary_noise(&scores.noise, &scenes);
             let said = to_value((&scores.scenes, &scores.summary, &scores.summary_noise));
             let found = to_value((&scenes, &summary, &noise));
-            let all = differences(&said, &found);
-            if let Some(first) = all.first().cloned() {
+            if let Some(first) = differences(&said, &found).into_iter().next() {
                 let (at, rest) = first.place[1..].split_at(1);
                 let part = ["scenes", "summary", "summary_noise"][at.parse::<usize>().unwrap_or(0)];
-                let place = format!("/protocols/{name}/{part}{rest}");
-                // The means of a scene and of the dataset both follow from a picture's number, not from each other.
-                let (scene, key) = rest.trim_start_matches('/').split_once('/').unwrap_or_default();
-                let is_below = part == "scenes" && all.iter().any(|other| other.place == format!("/1/{key}"));
-                let changed = match is_below {
-                    true => scores.places_of(scene, key).map(|below| format!("/protocols/{name}/{below}")).collect(),
-                    false => vec![place.clone()],
-                };
-                return Some((Difference { place, ..first }, changed));
+                return Some(Difference { place: format!("/protocols/{name}/{part}{rest}"), ..first });
             }
         }
         None
-    }
-}
-
-impl ProtocolResult {
-    /// The places in it of the numbers of which a scene's mean is made.
-    fn places_of(&self, scene: &str, key: &str) -> impl Iterator<Item = String> {
-        let picture = |(at, picture): (usize, &PictureValues)| {
-            let values = picture.values.keys().filter(move |metric| picture.key(**metric).to_string() == key);
-            values.map(move |metric| format!("pictures/{at}/values/{metric}")).collect::<Vec<_>>()
-        };
-        let pictures = self.pictures.iter().enumerate().filter(move |(_, it)| it.scene.as_str() == scene);
-        let places: Vec<String> = pictures.flat_map(picture).collect();
-        // Those of texels are means over instances.
-        let places = if places.is_empty() { vec!["texels".to_owned()] } else { places };
-        places.into_iter()
     }
 }
 
