@@ -36,7 +36,11 @@ pub enum EvalError {
     )]
     ReferenceSamples { scene: SceneId, found: u32, wanted: u32 },
     /// A result states a number that does not follow from the others in it.
-    #[error("'{}': at {place} it states {said}, but its own numbers give {found}; it was changed by hand", path.display())]
+    #[error(
+        "'{}': at {place} it states {said}, but the numbers below it give {found}: one of them was changed by hand; write it \
+         again: mateval eval score SUBMISSION --dataset DATASET --out '{}' --force",
+        path.display(), path.display()
+    )]
     Contradiction { path: PathBuf, place: String, said: String, found: String },
     #[error("the dataset '{}' has no renders; run `mateval prep render DATASET`", dataset.display())]
     NoPhotoRenderer { dataset: PathBuf },

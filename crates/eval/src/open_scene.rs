@@ -5,7 +5,8 @@ use std::sync::Arc;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{SceneFolder, is_rendered};
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{SceneError, TriangleMesh, glb, reference};
+use mateval_dataset::reference::{self, Surface};
+use mateval_dataset::{SceneError, TriangleMesh};
 use mateval_tracer::World;
 
 use crate::error::EvalError;
@@ -66,21 +67,14 @@ impl OpenScene {
     }
 }
 
-/// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's
-/// surfaces, or the dataset is unsound.
+/// The meshes of `instances.glb`, with the same triangles as the world's surfaces, or the dataset is unsound.
 fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
-    let nodes = glb::read(&folder.instances())?;
-    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
-    let named = nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids);
-    let meshes: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
-    let surfaces = &world.scene().surfaces;
-    let fits = named
-        && meshes.len() == surfaces.len()
-        && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
-    if fits {
-        return Ok(meshes);
+    let atlases = reference::read_plain(folder, scene)?.surfaces;
+    let triangles = |surface: &Surface| surface.mesh.triangles.len();
+    if atlases.iter().map(triangles).eq(world.scene().surfaces.iter().map(triangles)) {
+        return Ok(atlases.into_iter().map(|surface| surface.mesh).collect());
     }
     let path = folder.instances();
-    let what = "it does not fit scene.json and ground_truth/reference/geometry.glb; run `mateval prep verify`";
+    let what = "it does not fit ground_truth/reference/geometry.glb; run `mateval prep verify`";
     Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
 }

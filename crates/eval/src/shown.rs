@@ -5,17 +5,18 @@ use std::path::Path;
 
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{Progress, TriangleMesh};
+use mateval_dataset::{Progress, TriangleMesh, ViewId};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 use crate::error::EvalError;
+use crate::light::lighting::LightingName;
 use crate::light::reference::StoredReference;
 use crate::light::score::compare_light;
 use crate::materials::pictures::material_pictures;
 use crate::open_scene::{OpenScene, ViewSet, scored_views};
-use crate::protocol::Protocol;
+use crate::protocol::{Protocol, Track};
 use crate::scene::SceneTask;
 use crate::truth::ViewTruth;
 
@@ -53,6 +54,7 @@ fn predictions_of(
 
 /// The truth's light and every submission's of one view, clipped and encoded for display.
 pub struct SceneLight {
+    pub id: ViewId,
     pub truth: ViewTruth,
     /// What submissions are compared with.
     pub reference: Picture<SrgbRgb>,
@@ -60,13 +62,14 @@ pub struct SceneLight {
     pub predicted: Vec<Picture<SrgbRgb>>,
 }
 
-/// The views of a scene that are scored and share the input view's place, in the scene's order, in the first of the
-/// protocol's tracks. Fails where the dataset has no reference for it.
+/// The views of a scene that are scored and share the input view's place, in the scene's order: in the lighting, or in
+/// the first of the protocol's tracks. Fails where the dataset has no reference for it.
 pub fn scene_light(
     dataset: &Dataset,
     scene: &SceneFile,
     submissions: &[&Path],
     protocol: &Protocol,
+    lighting: Option<LightingName>,
     progress: Progress<'_>,
 ) -> Result<Vec<SceneLight>, EvalError> {
     let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
@@ -90,12 +93,12 @@ pub fn scene_light(
     };
     let truths = task.truths()?;
     let base_colors = task.base_colors()?;
-    let first = protocol.light.tracks.first().copied();
+    let track = if lighting.is_some() { Some(Track::Relit) } else { protocol.light.tracks.first().copied() };
     // By view, and by submission and view: submissions arrive in any order.
     let mut references = Vec::new();
     let mut predicted: BTreeMap<usize, Vec<Picture<SrgbRgb>>> = BTreeMap::new();
     compare_light(&task, &truths, &base_colors, protocol, &mut |submission, light| {
-        if Some(light.track) == first {
+        if Some(light.track) == track && light.lighting == lighting {
             if references.is_empty() {
                 references = light.references.iter().map(|reference| reference.picture.clone()).collect();
             }
@@ -108,6 +111,7 @@ pub fn scene_light(
     }
     let rows = truths.into_iter().zip(references).enumerate();
     let row = |(at, (truth, reference)): (usize, (ViewTruth, Picture<SrgbRgb>))| SceneLight {
+        id: task.views[at].id.clone(),
         truth,
         reference,
         predicted: predicted.values().map(|views| views[at].clone()).collect(),

@@ -99,25 +99,34 @@ pub fn read_mask(path: &Path) -> Result<Mask, ImageError> {
     Picture::new(raw.width, raw.height, raw.data.iter().map(|byte| *byte == 255).collect())
 }
 
-fn write<T: Copy>(
-    path: &Path,
-    picture: &Picture<T>,
-    (color, depth): (png::ColorType, png::BitDepth),
-    data: &[u8],
-) -> Result<(), ImageError> {
+type PixelFormat = (png::ColorType, png::BitDepth);
+
+fn write<T: Copy>(path: &Path, picture: &Picture<T>, format: PixelFormat, data: &[u8]) -> Result<(), ImageError> {
+    let bytes = file_bytes(picture, format, data).map_err(|what| ImageError::unsupported(path, what))?;
+    Ok(write_whole(path, &bytes)?)
+}
+
+fn file_bytes<T: Copy>(picture: &Picture<T>, (color, depth): PixelFormat, data: &[u8]) -> Result<Vec<u8>, String> {
     let side = |pixels: usize| {
-        let refused = || format!("a side of {pixels} pixels; PNG holds at most {}", u32::MAX);
-        u32::try_from(pixels).map_err(|_| ImageError::unsupported(path, refused()))
+        u32::try_from(pixels).map_err(|_| format!("a side of {pixels} pixels; PNG holds at most {}", u32::MAX))
     };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, side(picture.width())?, side(picture.height())?);
     encoder.set_color(color);
     encoder.set_depth(depth);
-    encoder
-        .write_header()
-        .and_then(|mut writer| writer.write_image_data(data))
-        .map_err(|error| ImageError::unsupported(path, error.to_string()))?;
-    Ok(write_whole(path, &bytes)?)
+    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(data));
+    written.map_err(|error| error.to_string())?;
+    Ok(bytes)
+}
+
+/// The bytes of a file of 8-bit RGB. Fails for sizes that PNG cannot hold.
+pub fn rgb_file(picture: &Picture<[u8; 3]>) -> Result<Vec<u8>, String> {
+    file_bytes(picture, (png::ColorType::Rgb, png::BitDepth::Eight), picture.pixels().as_flattened())
+}
+
+/// The bytes of a file of 8-bit grey. Fails for sizes that PNG cannot hold.
+pub fn grey_file(picture: &Picture<u8>) -> Result<Vec<u8>, String> {
+    file_bytes(picture, (png::ColorType::Grayscale, png::BitDepth::Eight), picture.pixels())
 }
 
 /// A decoded PNG, with palettes and samples of fewer than eight bits expanded.

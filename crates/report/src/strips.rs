@@ -136,7 +136,7 @@ pub(crate) fn rows(
             protocol.light.tracks = vec![track];
             protocol.light.samples =
                 SampleRules { at_320x240: samples, least: samples, most: samples, ..protocol.light.samples };
-            let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, progress)?;
+            let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, None, progress)?;
             Ok(views.into_iter().map(light_row).collect())
         }
     }

@@ -94,10 +94,7 @@ fn a_result_that_contradicts_itself_is_refused() {
         json::write(&path, &changed).unwrap();
         let error = ResultFile::read(&path).unwrap_err().to_string();
         let shown = if place.starts_with("pictures") { "/scenes/living/albedo." } else { place };
-        assert!(error.contains(base) && error.contains(shown), "{error}");
-        // The number that was changed, or those of the mean's pictures.
-        let changed = error.split("give ").nth(1).unwrap();
-        assert!(changed.contains(&format!("{base}/{place}")) && changed.contains("was changed by hand"), "{error}");
+        assert!(error.contains(base) && error.contains(shown) && error.contains("changed by hand"), "{error}");
         assert!(error.contains("mateval eval score"), "{error}");
     }
     json::write(&path, &SCORED.result).unwrap();
