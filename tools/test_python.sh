@@ -55,7 +55,7 @@ for name in ${PYTHONS:-python3.9 python3.11 python3.13}; do
     [ -n "$python" ] || { echo "$name was not found, and is not tested"; continue; }
     "$python" --version
     "$python" -m venv "$work/env$tested"
-    "$work/env$tested/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl pytest mypy trimesh
+    "$work/env$tested/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl pytest mypy trimesh pandas nbclient ipykernel
     MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$dist" \
         "$work/env$tested/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
     tested=$((tested + 1))

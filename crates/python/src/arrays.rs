@@ -7,29 +7,33 @@ use std::path::PathBuf;
 use half::f16;
 use mateval_dataset::{Camera, SceneError};
 use mateval_image::limits::MAX_PIXELS;
-use mateval_image::transfer::linear_from_srgb;
-use mateval_image::{ImageError, LinearRgb, Mask, Picture, SrgbRgb};
+use mateval_image::transfer::{byte_from_unit, linear_from_srgb};
+use mateval_image::{ImageError, LinearRgb, Mask, Picture, SrgbRgb, png_io};
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods as _, PyUntypedArray, PyUntypedArrayMethods as _,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::long_work::failed;
 
-/// Rows of pixels as an array of shape (height, width).
-pub fn plane<'py, T: Element + Copy>(py: Python<'py>, picture: &Picture<T>) -> PyResult<Bound<'py, PyArray2<T>>> {
-    PyArray1::from_slice(py, picture.pixels()).reshape([picture.height(), picture.width()])
+/// Rows of pixels as an array of shape (height, width), which takes over the picture's memory.
+pub fn plane<'py, T: Element + Copy>(py: Python<'py>, picture: Picture<T>) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let shape = [picture.height(), picture.width()];
+    PyArray1::from_vec(py, picture.into_pixels()).reshape(shape)
 }
 
-/// Rows of pixels as an array of shape (height, width, 3).
+/// Rows of pixels as an array of shape (height, width, 3), which takes over the picture's memory where `channels` does
+/// not change the size of a pixel.
 pub fn triples<'py, P: Copy, T: Element + Copy>(
     py: Python<'py>,
-    picture: &Picture<P>,
+    picture: Picture<P>,
     channels: impl Fn(P) -> [T; 3],
 ) -> PyResult<Bound<'py, PyArray3<T>>> {
-    let values: Vec<T> = picture.pixels().iter().flat_map(|pixel| channels(*pixel)).collect();
-    PyArray1::from_vec(py, values).reshape([picture.height(), picture.width(), 3])
+    let shape = [picture.height(), picture.width(), 3];
+    let pixels: Vec<[T; 3]> = picture.into_pixels().into_iter().map(channels).collect();
+    PyArray1::from_vec(py, pixels.into_flattened()).reshape(shape)
 }
 
 /// Vectors as an array of shape (number, N).
@@ -79,10 +83,10 @@ pub struct MapInput {
 }
 
 impl MapInput {
-    /// Copies the array. Fails for anything but an array of the dtypes of [`Numbers`], and for one of more numbers than
-    /// a picture may have: views such as those of `numpy.broadcast_to` may be larger than memory.
+    /// Copies the array. Fails for anything but an array or a tensor of the dtypes of [`Numbers`], and for one of more
+    /// numbers than a picture may have: views such as those of `numpy.broadcast_to` may be larger than memory.
     pub fn new(name: &'static str, given: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let array = untyped(name, given)?;
+        let array = &untyped(name, given)?;
         let count = array.shape().iter().try_fold(1_u64, |count, axis| count.checked_mul(*axis as u64));
         if count.is_none_or(|count| count > 4 * MAX_PIXELS) {
             let found = array.shape();
@@ -119,10 +123,12 @@ impl MapInput {
         Picture::new(width, height, self.unit_values()).ok()
     }
 
-    /// A linear picture of shape (height, width, 3): integers are decoded from sRGB, floats are linear.
-    pub fn linear(&self) -> PyResult<Picture<LinearRgb>> {
+    /// A linear picture of shape (height, width, 3). Unless `is_srgb` says so, integers are decoded from sRGB and floats
+    /// are linear.
+    pub fn linear(&self, is_srgb: Option<bool>) -> PyResult<Picture<LinearRgb>> {
         let picture = self.colours().ok_or_else(|| self.wrong_shape("(height, width, 3)"))?;
-        let decode = |value: f32| if self.is_stored() { linear_from_srgb(value) } else { value };
+        let is_srgb = is_srgb.unwrap_or_else(|| self.is_stored());
+        let decode = |value: f32| if is_srgb { linear_from_srgb(value) } else { value };
         Ok(picture.map(|rgb| LinearRgb(rgb.map(decode))))
     }
 
@@ -144,7 +150,9 @@ impl MapInput {
         let Some(at) = floats.iter().position(|value| !range.contains(value)) else { return Ok(()) };
         let expected = format!("values from {} to {}", range.start(), range.end());
         let (found, index) = (floats[at], index_of(at, &self.shape));
-        Err(PyValueError::new_err(format!("{}: expected {expected}, found {found} at {index:?}", self.name)))
+        let is_bytes = floats.iter().all(|value| (0.0..=255.0).contains(value));
+        let advice = if is_bytes { "; divide values of 0 to 255 by 255, or pass them as uint8" } else { "" };
+        Err(PyValueError::new_err(format!("{}: expected {expected}, found {found} at {index:?}{advice}", self.name)))
     }
 
     /// The side of a square map with a third axis of three channels, or without one. Fails for other shapes and sides.
@@ -192,7 +200,17 @@ impl MapInput {
     }
 
     fn wrong_shape(&self, expected: &str) -> PyErr {
-        PyValueError::new_err(format!("{}: expected the shape {expected}, found {:?}", self.name, self.shape))
+        let advice = match *self.shape.as_slice() {
+            [3, height, width] if height != 3 && width != 3 => {
+                "; `numpy.moveaxis(array, 0, -1)` puts the channels last"
+            }
+            [1, _, _] | [1, _, _, _] => "; `array[0]` drops the first axis",
+            [_, _, 1] => "; `array[..., 0]` drops the last axis",
+            [_, _, 4] => "; `array[..., :3]` drops the fourth channel",
+            _ => "",
+        };
+        let (name, found) = (self.name, &self.shape);
+        PyValueError::new_err(format!("{name}: expected the shape {expected}, found {found:?}{advice}"))
     }
 }
 
@@ -205,7 +223,7 @@ pub enum ColoursOrNumbers {
 
 /// A mask. Fails for anything but an array of bool of the shape (height, width).
 pub fn mask_of(given: &Bound<'_, PyAny>) -> PyResult<Mask> {
-    let array = untyped("mask", given)?;
+    let array = &untyped("mask", given)?;
     let Some(pixels) = copied::<bool>(array)? else {
         return Err(PyTypeError::new_err(format!("mask: expected bool, found {}", array.dtype())));
     };
@@ -217,11 +235,13 @@ pub fn mask_of(given: &Bound<'_, PyAny>) -> PyResult<Mask> {
     .ok_or_else(|| PyValueError::new_err(wrong()))
 }
 
-fn untyped<'a, 'py>(name: &str, given: &'a Bound<'py, PyAny>) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
-    given.cast::<PyUntypedArray>().or_else(|_| {
-        let found = given.get_type().fully_qualified_name()?;
-        Err(PyTypeError::new_err(format!("{name}: expected a NumPy array, found {found}")))
-    })
+/// A NumPy array as it is, a tensor of another library as an array.
+fn untyped<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    if let Ok(array) = given.cast::<PyUntypedArray>() {
+        return Ok(array.clone());
+    }
+    let array = given.py().import("mateval.tensors")?.getattr("as_array")?.call1((name, given))?;
+    Ok(array.cast_into::<PyUntypedArray>()?)
 }
 
 /// The elements of an array in row-major order, whatever its strides. `None` where it has another dtype.
@@ -238,4 +258,29 @@ fn index_of(mut at: usize, shape: &[usize]) -> Vec<usize> {
         (*length, at) = (at % *length, at / *length);
     }
     index
+}
+
+/// A picture of bytes, of shape (height, width, 3) or (height, width), as the bytes of a PNG file.
+#[pyfunction]
+pub fn png<'py>(py: Python<'py>, picture: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyBytes>> {
+    let input = MapInput::new("picture", picture)?;
+    let Numbers::Bytes(bytes) = &input.numbers else {
+        return Err(PyTypeError::new_err("picture: expected uint8"));
+    };
+    let file = match *input.shape.as_slice() {
+        [height, width, 3] => {
+            let pixels = bytes.as_chunks::<3>().0.to_vec();
+            png_io::rgb_file(&Picture::new(width, height, pixels).map_err(failed)?)
+        }
+        [height, width] => png_io::grey_file(&Picture::new(width, height, bytes.clone()).map_err(failed)?),
+        _ => return Err(input.wrong_shape("(height, width, 3) or (height, width)")),
+    };
+    Ok(PyBytes::new(py, &file.map_err(PyValueError::new_err)?))
+}
+
+/// Linear colours of shape (height, width, 3) as sRGB: uint8 of the same shape, clipped.
+#[pyfunction]
+pub fn srgb_bytes<'py>(py: Python<'py>, picture: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    let linear = MapInput::new("picture", picture)?.linear(Some(false))?;
+    triples(py, linear.to_srgb(), |SrgbRgb(rgb)| rgb.map(byte_from_unit))
 }

@@ -24,7 +24,7 @@ use pyo3::types::PyDict;
 use crate::arrays::{MapInput, plane, triples};
 use crate::dataset::Scene;
 use crate::instance::SceneSource;
-use crate::long_work::{failed, run_long};
+use crate::long_work::{Listener, failed, run_long, shown_in_notebook};
 
 /// The maps of an instance, encoded as a submission stores them.
 #[pyclass(frozen, get_all, module = "mateval")]
@@ -40,24 +40,25 @@ pub struct Maps {
 }
 
 /// The maps of an instance before Python gets them.
-pub(crate) struct MadeMaps {
-    pub(crate) maps: maps::Maps,
-    pub(crate) seen: Option<Mask>,
+struct MadeMaps {
+    maps: maps::Maps,
+    seen: Option<Mask>,
 }
 
 /// Lifts an estimate of the input view to the atlases of all instances that have one: seen texels get the estimate, the
 /// others that of the seen points nearest to them. The maps are those of `mateval baseline nn`.
 ///
 /// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
-/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. At least one of them must be given.
+/// not be the view's. At least one of them must be given. encoding says how base_color is stored: "linear" or "srgb";
+/// by default floats are linear, and uint8 and uint16 are sRGB.
 ///
 /// neighbours is the number of seen points that an unseen texel is computed from, normal_weight the distance in metres
 /// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side
-/// of all maps in texels; None is the dataset's own size of each.
+/// of all maps in texels; None is the dataset's own size of each. progress is described in `mateval.progress`.
 ///
 /// Returns the maps by the id of the instance, in the scene's order.
 #[pyfunction]
-#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, neighbours=1, normal_weight=0.0, any_instance=false, atlas_size=None))]
+#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, encoding=None, neighbours=1, normal_weight=0.0, any_instance=false, atlas_size=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
 pub fn lift<'py>(
     py: Python<'py>,
@@ -65,24 +66,25 @@ pub fn lift<'py>(
     base_color: Option<Bound<'py, PyAny>>,
     roughness: Option<Bound<'py, PyAny>>,
     metallic: Option<Bound<'py, PyAny>>,
+    encoding: Option<&str>,
     neighbours: u8,
     normal_weight: f64,
     any_instance: bool,
     atlas_size: Option<u32>,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let estimate = estimate([("base_color", base_color), ("roughness", roughness), ("metallic", metallic)])?;
+    let listener = Listener::of(py, progress)?;
+    let maps = [("base_color", base_color), ("roughness", roughness), ("metallic", metallic)];
+    let estimate = estimate(maps, encoding)?;
     let options = options(neighbours, normal_weight, any_instance, atlas_size)?;
     let source = Arc::clone(&scene.source);
-    let all = run_long(py, move |progress| lifted(&source, &estimate, &options, progress))?.map_err(failed)?;
+    let all =
+        run_long(py, &listener, move |progress| lifted(&source, &estimate, &options, progress))?.map_err(failed)?;
     by_id(py, scene, all)
 }
 
 /// The maps by the id of the instance.
-pub(crate) fn by_id<'py>(
-    py: Python<'py>,
-    scene: &Scene,
-    all: BTreeMap<usize, MadeMaps>,
-) -> PyResult<Bound<'py, PyDict>> {
+fn by_id<'py>(py: Python<'py>, scene: &Scene, all: BTreeMap<usize, MadeMaps>) -> PyResult<Bound<'py, PyDict>> {
     let by_id = PyDict::new(py);
     for (instance, made) in all {
         by_id.set_item(scene.source.file().instances[instance].id.as_str(), made.into_python(py)?)?;
@@ -91,7 +93,15 @@ pub(crate) fn by_id<'py>(
 }
 
 /// An estimate of pictures of one size.
-pub(crate) fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Estimate> {
+fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3], encoding: Option<&str>) -> PyResult<Estimate> {
+    let is_srgb = match encoding {
+        None => None,
+        Some("srgb") => Some(true),
+        Some("linear") => Some(false),
+        Some(other) => {
+            return Err(PyValueError::new_err(format!("encoding: expected 'linear' or 'srgb', found '{other}'")));
+        }
+    };
     let read = |(name, array): &(&'static str, Option<Bound<'_, PyAny>>)| {
         array.as_ref().map(|array| MapInput::new(name, array)).transpose()
     };
@@ -104,7 +114,7 @@ pub(crate) fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> 
     present.try_for_each(|other| other.check_same_size(first))?;
     let [base_color, roughness, metallic] = &inputs;
     Ok(Estimate {
-        base_color: base_color.as_ref().map(MapInput::linear).transpose()?,
+        base_color: base_color.as_ref().map(|map| map.linear(is_srgb)).transpose()?,
         roughness: roughness.as_ref().map(MapInput::plane).transpose()?,
         metallic: metallic.as_ref().map(MapInput::plane).transpose()?,
         ..Estimate::default()
@@ -155,15 +165,22 @@ fn lifted(
     Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
+#[pymethods]
+impl Maps {
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown_in_notebook(slf, "maps")
+    }
+}
+
 impl MadeMaps {
     fn into_python(self, py: Python<'_>) -> PyResult<Maps> {
-        let colours = |picture: &Picture<[u8; 3]>| PyResult::Ok(triples(py, picture, |rgb| rgb)?.unbind());
-        let numbers = |picture: &Picture<u8>| PyResult::Ok(plane(py, picture)?.unbind());
+        let colours = |picture: Picture<[u8; 3]>| PyResult::Ok(triples(py, picture, |rgb| rgb)?.unbind());
+        let numbers = |picture: Picture<u8>| PyResult::Ok(plane(py, picture)?.unbind());
         Ok(Maps {
-            base_color: self.maps.base_color.as_ref().map(colours).transpose()?,
-            roughness: self.maps.roughness.as_ref().map(numbers).transpose()?,
-            metallic: self.maps.metallic.as_ref().map(numbers).transpose()?,
-            seen: self.seen.as_ref().map(|seen| PyResult::Ok(plane(py, seen)?.unbind())).transpose()?,
+            base_color: self.maps.base_color.map(colours).transpose()?,
+            roughness: self.maps.roughness.map(numbers).transpose()?,
+            metallic: self.maps.metallic.map(numbers).transpose()?,
+            seen: self.seen.map(|seen| PyResult::Ok(plane(py, seen)?.unbind())).transpose()?,
         })
     }
 }
@@ -172,16 +189,15 @@ impl MadeMaps {
 /// the view shows nothing; parts without a pattern have their median. The maps are those of
 /// `mateval baseline procedural`.
 ///
-/// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
-/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. base_color must be given.
-/// `mateval.delight` makes all of them from the photo.
+/// base_color, roughness, metallic and encoding are as `lift` takes them; base_color must be given. `mateval.delight`
+/// makes all maps from the photo.
 ///
 /// part_set names the parts; None stands for those of the source. keep_seen keeps the estimate in texels that the input
 /// view shows. detail, 0 to 1, is how much of a pattern's randomness is kept.
 ///
 /// Returns the maps by the id of the instance, in the scene's order.
 #[pyfunction]
-#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, part_set=None, keep_seen=false, detail=1.0))]
+#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, encoding=None, part_set=None, keep_seen=false, detail=1.0, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
 pub fn procedural<'py>(
     py: Python<'py>,
@@ -189,18 +205,22 @@ pub fn procedural<'py>(
     base_color: Option<Bound<'py, PyAny>>,
     roughness: Option<Bound<'py, PyAny>>,
     metallic: Option<Bound<'py, PyAny>>,
+    encoding: Option<&str>,
     part_set: Option<&str>,
     keep_seen: bool,
     detail: f64,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let estimate = estimate([("base_color", base_color), ("roughness", roughness), ("metallic", metallic)])?;
+    let listener = Listener::of(py, progress)?;
+    let maps = [("base_color", base_color), ("roughness", roughness), ("metallic", metallic)];
+    let estimate = estimate(maps, encoding)?;
     let part_set = part_set.map(|name| name.parse::<PartSetId>()).transpose();
     let part_set = part_set.map_err(|fault| PyValueError::new_err(format!("part_set: {fault}")))?;
     let options = ProceduralOptions { part_set, keep_seen, detail, ..ProceduralOptions::default() };
     options.check().map_err(|fault| PyValueError::new_err(fault.to_string()))?;
     let source = Arc::clone(&scene.source);
-    let all = run_long(py, move |progress| procedural_maps(&source, &estimate, &options, progress))?.map_err(failed)?;
-    by_id(py, scene, all)
+    let all = run_long(py, &listener, move |progress| procedural_maps(&source, &estimate, &options, progress))?;
+    by_id(py, scene, all.map_err(failed)?)
 }
 
 /// The maps by the instance's place in the scene.
@@ -239,10 +259,16 @@ pub struct Delit {
 /// result is that of `mateval baseline delight`.
 ///
 /// lights chooses which lights may shine: "room" (light fixtures, ceilings, what is seen to glow, the world around, and
-/// the lights of a stage) or "stage" (the latter alone, as in PSDR-Room).
+/// the lights of a stage) or "stage" (the latter alone, as in PSDR-Room). progress is described in `mateval.progress`.
 #[pyfunction]
-#[pyo3(signature = (scene, *, lights="room"))]
-pub fn delight(py: Python<'_>, scene: &Scene, lights: &str) -> PyResult<Delit> {
+#[pyo3(signature = (scene, *, lights="room", progress=None))]
+pub fn delight<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    lights: &str,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Delit> {
+    let listener = Listener::of(py, progress)?;
     let lights = match lights {
         "room" => CandidateLights::Room,
         "stage" => CandidateLights::Stage,
@@ -250,28 +276,28 @@ pub fn delight(py: Python<'_>, scene: &Scene, lights: &str) -> PyResult<Delit> {
     };
     let options = DelightOptions { lights, ..DelightOptions::default() };
     let source = Arc::clone(&scene.source);
-    let delit = run_long(py, move |progress| -> Result<DelitPhoto, BaselineError> {
+    let delit = run_long(py, &listener, move |progress| -> Result<DelitPhoto, BaselineError> {
         let geometry = SceneGeometry::read(source.folder(), source.file())?;
         baseline::delight(&geometry, &options, progress)
     })?;
-    delit_into_python(py, &delit.map_err(failed)?)
+    delit_into_python(py, delit.map_err(failed)?)
 }
 
-fn delit_into_python(py: Python<'_>, delit: &DelitPhoto) -> PyResult<Delit> {
-    let colors = |picture: &Picture<LinearRgb>| PyResult::Ok(triples(py, picture, |rgb| rgb.0)?.unbind());
-    let numbers = |picture: &Picture<f32>| PyResult::Ok(plane(py, picture)?.unbind());
+fn delit_into_python(py: Python<'_>, delit: DelitPhoto) -> PyResult<Delit> {
+    let colors = |picture: Picture<LinearRgb>| PyResult::Ok(triples(py, picture, |rgb| rgb.0)?.unbind());
+    let numbers = |picture: Picture<f32>| PyResult::Ok(plane(py, picture)?.unbind());
     let radiances = PyDict::new(py);
     for fitted in &delit.lights {
         let [r, g, b] = fitted.radiance;
         radiances.set_item(&fitted.light.name, (r, g, b))?;
     }
     Ok(Delit {
-        base_color: colors(&delit.base_color)?,
-        roughness: numbers(&delit.roughness)?,
-        metallic: numbers(&delit.metallic)?,
-        shading: colors(&delit.shading)?,
-        gloss: colors(&delit.gloss)?,
-        confidence: numbers(&delit.confidence)?,
+        base_color: colors(delit.base_color)?,
+        roughness: numbers(delit.roughness)?,
+        metallic: numbers(delit.metallic)?,
+        shading: colors(delit.shading)?,
+        gloss: colors(delit.gloss)?,
+        confidence: numbers(delit.confidence)?,
         radiances: radiances.unbind(),
     })
 }

@@ -12,7 +12,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyIterator, PyList, PyType};
 
 use crate::instance::{Instance, Part, SceneSource};
-use crate::long_work::{failed, unknown_id};
+use crate::long_work::{failed, shown_in_notebook, unknown_id};
 use crate::view::View;
 
 /// A dataset on disk. Opening it checks its JSON files against its manifest; pictures are read when they are used.
@@ -81,6 +81,12 @@ impl Dataset {
         let root = self.0.root.display();
         format!("<mateval.Dataset '{}' in '{root}', {} scenes>", self.0.file.name, self.0.scenes.len())
     }
+}
+
+/// An open dataset, or that in the folder of a path.
+pub fn opened(given: &Bound<'_, PyAny>) -> PyResult<Arc<open::Dataset>> {
+    let dataset = given.py().import("mateval.dataset")?.getattr("open")?.call1((given,))?;
+    Ok(Arc::clone(&dataset.cast::<Dataset>()?.get().0))
 }
 
 /// The place of the scene with this id. Fails where the dataset has none.
@@ -174,6 +180,35 @@ impl Scene {
             by_id(py, self, "view", views.map(|(at, file)| (file.id.as_str(), view(at))))
         };
         Ok(self.views.get_or_try_init(py, all)?.clone_ref(py))
+    }
+
+    /// Renders the scene with these maps, as the scorer shows them: by the id of the view, (height, width, 3), uint8, sRGB
+    /// after exposure. The views are those that share the input view's place. The dataset's ground truth is needed.
+    ///
+    /// maps holds, by the id of the instance, `mateval.Maps` or dictionaries with base_color, roughness and metallic, as
+    /// `Submission.write` takes them; or it is the path of a submission. Instances without maps are grey, as they are
+    /// scored. light is "true" or a lighting of the scene, as "warm_cool" or "alone_1". samples is the number of paths
+    /// a pixel in each of two halves.
+    #[pyo3(signature = (maps, *, light="true", samples=16, progress=None))]
+    fn render<'py>(
+        slf: &Bound<'py, Self>,
+        maps: Bound<'py, PyAny>,
+        light: &str,
+        samples: u32,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let render = slf.py().import("mateval.rendering")?.getattr("render")?;
+        render.call1((slf, maps, light, samples, progress))
+    }
+
+    /// The paths of a pickled scene: the copy opens the same folder.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (PathBuf, String))> {
+        let reopen = py.import("mateval.dataset")?.getattr("reopened_scene")?;
+        Ok((reopen, (std::path::absolute(&self.source.dataset.root)?, self.id().to_owned())))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown_in_notebook(slf, "scene")
     }
 
     /// The input view, whose picture methods may see.

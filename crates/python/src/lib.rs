@@ -11,6 +11,7 @@ mod baselines;
 mod dataset;
 mod instance;
 mod long_work;
+mod render;
 mod reports;
 mod submission;
 mod view;
@@ -22,6 +23,10 @@ use pyo3::prelude::*;
 /// The extension module.
 #[pyo3::pymodule]
 mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::arrays::{png, srgb_bytes};
     #[pymodule_export]
     use crate::baselines::{Delit, Maps, delight, lift, procedural};
     #[pymodule_export]
@@ -31,11 +36,18 @@ mod _core {
     #[pymodule_export]
     use crate::main;
     #[pymodule_export]
-    use crate::reports::{lint, lpips, psnr, score, ssim};
+    use crate::render::render;
+    #[pymodule_export]
+    use crate::reports::{lint, lpips, psnr, rank, read_result, score, ssim, tables};
     #[pymodule_export]
     use crate::submission::Submission;
     #[pymodule_export]
     use crate::view::{Camera, Truth, View};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }
 
 /// Runs the command with these words, of which the first is the program's name, and returns its exit code.

@@ -1,4 +1,4 @@
-//! Runs long work so that Ctrl-C ends the call, and turns errors into exceptions.
+//! Runs long work so that Ctrl-C ends the call and Python hears of its progress, and turns errors into exceptions.
 //!
 //! Python's signal handlers run in its main thread, and only when that thread asks for them. The work therefore runs in
 //! the pool, which owns its inputs, while the calling thread waits and asks several times a second. After an interrupt
@@ -28,26 +28,89 @@ const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
 /// The payload with which unwanted work unwinds.
 struct Unwanted;
 
+/// What Python hears of long work: what `mateval.progress.listener` makes of the argument `progress` of a call.
+pub struct Listener<'py>(Option<Bound<'py, PyAny>>);
+
+impl<'py> Listener<'py> {
+    /// For work of less than a second.
+    pub fn none() -> Self {
+        Self(None)
+    }
+
+    /// Fails where `progress` is neither None, a bool nor callable.
+    pub fn of(py: Python<'py>, progress: Option<Bound<'py, PyAny>>) -> PyResult<Self> {
+        let listener = py.import("mateval.progress")?.getattr("listener")?.call1((progress,))?;
+        Ok(Self((!listener.is_none()).then_some(listener)))
+    }
+
+    /// Passes on what was reported since the last call.
+    fn hear(&self, reported: &Mutex<Reported>) -> PyResult<()> {
+        let reported = std::mem::take(&mut *reported.lock().unwrap_or_else(PoisonError::into_inner));
+        let Some(listener) = &self.0 else { return Ok(()) };
+        for message in reported.messages {
+            listener.call_method1("message", (message,))?;
+        }
+        for (name, done, total) in [reported.part, reported.step].into_iter().flatten() {
+            listener.call1((name, done, total))?;
+        }
+        Ok(())
+    }
+}
+
+/// Ends what a listener shows, as a bar, however the call ends.
+struct Closed<'a, 'py>(&'a Listener<'py>);
+
+impl Drop for Closed<'_, '_> {
+    fn drop(&mut self) {
+        // Nothing can be done about a bar that cannot be removed.
+        let _ = self.0.0.as_ref().map(|listener| listener.call_method0("close"));
+    }
+}
+
+/// The last reports of long work, each with what is done and how much there is of it.
+#[derive(Default)]
+struct Reported {
+    part: Option<(String, usize, usize)>,
+    step: Option<(String, usize, usize)>,
+    messages: Vec<String>,
+}
+
+impl Reported {
+    fn add(&mut self, report: Report<'_>) {
+        match report {
+            // Steps belong to the part that began last.
+            Report::Part { name, done, total } => (self.part, self.step) = (Some((name.to_owned(), done, total)), None),
+            Report::Step { name, done, total } => self.step = Some((name.to_owned(), done, total)),
+            Report::Message(text) => self.messages.push(text.to_owned()),
+        }
+    }
+}
+
 /// Runs `work` in this process's pool, detached from Python, and returns its result. Fails with the exception of a
-/// signal's handler, as `KeyboardInterrupt`. Panics where the work does.
+/// signal's handler, as `KeyboardInterrupt`, or of the listener. Panics where the work does.
 pub fn run_long<T: Send + 'static>(
     py: Python<'_>,
+    listener: &Listener<'_>,
     work: impl FnOnce(Progress<'_>) -> T + Send + 'static,
 ) -> PyResult<T> {
     let unwanted = Arc::new(AtomicBool::new(false));
     let is_unwanted = Arc::clone(&unwanted);
+    let reported = Arc::new(Mutex::new(Reported::default()));
+    let reports = Arc::clone(&reported);
     let (sender, mut receiver) = channel();
     pool(py)?.spawn(move || {
-        let progress = |_: Report<'_>| {
+        let progress = |report: Report<'_>| {
             if is_unwanted.load(Ordering::Relaxed) {
                 resume_unwind(Box::new(Unwanted));
             }
+            reports.lock().unwrap_or_else(PoisonError::into_inner).add(report);
         };
         // After a panic nothing of the work is used again: it owns its inputs.
         let result = catch_unwind(AssertUnwindSafe(|| work(&progress)));
         // After an interrupt nobody receives it.
         let _ = sender.send(result);
     });
+    let _closed = Closed(listener);
     loop {
         let received;
         (receiver, received) = py.detach(move || {
@@ -55,10 +118,13 @@ pub fn run_long<T: Send + 'static>(
             (receiver, received)
         });
         match received {
-            Ok(Ok(result)) => return Ok(result),
+            Ok(Ok(result)) => {
+                listener.hear(&reported)?;
+                return Ok(result);
+            }
             Ok(Err(panic)) => resume_unwind(panic),
             Err(RecvTimeoutError::Timeout) => {
-                if let Err(interrupt) = py.check_signals() {
+                if let Err(interrupt) = py.check_signals().and_then(|()| listener.hear(&reported)) {
                     unwanted.store(true, Ordering::Relaxed);
                     abandon_pool(py);
                     return Err(interrupt);
@@ -101,10 +167,36 @@ pub fn abandon_pool(_attached: Python<'_>) {
     owned.take_if(|owned| owned.process == std::process::id());
 }
 
-/// An exception of the package `mateval.errors`: `mateval.Error` with the text that the command prints after `error: `.
+/// What a notebook shows of an object: HTML of a function of `mateval.display`.
+pub fn shown_in_notebook<'py, T>(object: &Bound<'py, T>, function: &str) -> PyResult<Bound<'py, PyAny>> {
+    object.py().import("mateval.display")?.getattr(function)?.call1((object.as_any(),))
+}
+
+/// An exception of the package `mateval.errors`: `mateval.Error` with the text that the command prints after `error: `,
+/// in which options are arguments.
 pub fn failed(error: impl Into<anyhow::Error>) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    exception(&CLASS, "Error", mateval_cli::error_text(&error.into()))
+    exception(&CLASS, "Error", with_arguments(&mateval_cli::error_text(&error.into())))
+}
+
+/// `--force` as `force=True` and `--atlas-size` as `atlas_size`, but for commands in backticks.
+fn with_arguments(text: &str) -> String {
+    let prose = |part: &str| {
+        let mut pieces = part.split("--");
+        let mut changed = pieces.next().unwrap_or_default().to_owned();
+        for piece in pieces {
+            let is_option = piece.starts_with(|c: char| c.is_ascii_lowercase());
+            let end = piece.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(piece.len());
+            match &piece[..end] {
+                _ if !is_option => changed.extend(["--", piece]),
+                "force" => changed.extend(["force=True", &piece[end..]]),
+                name => changed.extend([&*name.replace('-', "_"), &piece[end..]]),
+            }
+        }
+        changed
+    };
+    let parts = text.split('`').enumerate();
+    parts.map(|(at, part)| if at % 2 == 0 { prose(part) } else { part.to_owned() }).collect::<Vec<_>>().join("`")
 }
 
 /// `mateval.UnknownId`.

@@ -1,5 +1,5 @@
-//! The command's reports as JSON texts, which Python parses, `mateval.lint` and `mateval.score`; and the scorer's
-//! metrics of two arrays.
+//! The command's reports as texts, which Python parses: `mateval.lint`, `mateval.score`, `mateval.tables` and
+//! `mateval.rank`; and the scorer's metrics of two arrays.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -9,9 +9,11 @@ use mateval_cli::{TOOL, find_weights};
 use mateval_dataset::open::Dataset as OpenDataset;
 use mateval_dataset::{Progress, SceneId, json};
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan};
 use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, MetricError, Net, Pixel, Psnr, mse, ssim_valid_windows};
+use mateval_report::tables::{Grouping, TableFormat};
 use mateval_submission::lint::{LintFile, LintPlan, lint as check, plain, refused};
 use mateval_submission::{SubmissionError, archive};
 use pyo3::exceptions::PyValueError;
@@ -19,13 +21,20 @@ use pyo3::prelude::*;
 
 use crate::arrays::{ColoursOrNumbers, MapInput, mask_of};
 use crate::dataset::{Dataset, scene_place};
-use crate::long_work::{failed, run_long};
+use crate::long_work::{Listener, failed, run_long};
 
 /// Checks a submission, a folder or an archive. Returns the report as JSON, and as text for people.
 #[pyfunction]
-pub fn lint(py: Python<'_>, submission: PathBuf, dataset: &Dataset) -> PyResult<(String, String)> {
+#[pyo3(signature = (submission, dataset, *, progress))]
+pub fn lint<'py>(
+    py: Python<'py>,
+    submission: PathBuf,
+    dataset: &Dataset,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<(String, String)> {
+    let listener = Listener::of(py, progress)?;
     let dataset = Arc::clone(&dataset.0);
-    let checked = run_long(py, move |progress| lint_file(&dataset, &submission, progress))?;
+    let checked = run_long(py, &listener, move |progress| lint_file(&dataset, &submission, progress))?;
     let file = checked.context("cannot check the submission").map_err(failed)?;
     Ok((json::to_text(&file), plain(&file)))
 }
@@ -41,15 +50,17 @@ fn lint_file(dataset: &OpenDataset, submission: &Path, progress: Progress<'_>) -
 
 /// Scores a submission, a folder or an archive. Returns the result as JSON.
 #[pyfunction]
-#[pyo3(signature = (submission, dataset, *, scenes, protocol, cache))]
-pub fn score(
-    py: Python<'_>,
+#[pyo3(signature = (submission, dataset, *, scenes, protocol, cache, progress))]
+pub fn score<'py>(
+    py: Python<'py>,
     submission: PathBuf,
     dataset: &Dataset,
     scenes: Vec<String>,
     protocol: &str,
     cache: Option<PathBuf>,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<String> {
+    let listener = Listener::of(py, progress)?;
     let dataset = Arc::clone(&dataset.0);
     scenes.iter().try_for_each(|id| scene_place(&dataset, id).map(drop))?;
     let task = ScoreTask {
@@ -59,7 +70,65 @@ pub fn score(
         protocol: Protocol::named(protocol).map_err(failed)?,
         cache,
     };
-    run_long(py, move |progress| task.run(progress))?.map_err(failed)
+    run_long(py, &listener, move |progress| task.run(progress))?.map_err(failed)
+}
+
+/// Reads `RESULT.json`. Returns its text.
+#[pyfunction]
+pub fn read_result(path: PathBuf) -> PyResult<String> {
+    // As the command writes it, whatever its layout was.
+    ResultFile::read(&path).map(|result| json::to_lines(&result)).map_err(failed)
+}
+
+/// The tables of several results, and of that of the truth as their ceiling, in a format of `mateval eval tables`.
+#[pyfunction]
+pub fn tables(
+    py: Python<'_>,
+    results: Vec<String>,
+    ceiling: Option<&str>,
+    protocol: &str,
+    by: &str,
+    format: &str,
+) -> PyResult<String> {
+    let grouping = match by {
+        "dataset" => Grouping::Dataset,
+        "scene" => Grouping::Scene,
+        "category" => Grouping::Category,
+        "super_category" => Grouping::SuperCategory,
+        other => {
+            let expected = "'dataset', 'scene', 'category' or 'super_category'";
+            return Err(PyValueError::new_err(format!("by: expected {expected}, found '{other}'")));
+        }
+    };
+    let format = match format {
+        "csv" => TableFormat::Csv,
+        "markdown" => TableFormat::Markdown,
+        "latex" => TableFormat::Latex,
+        "text" => TableFormat::Text { bold: false, columns: None },
+        other => {
+            let expected = "'frames', 'csv', 'markdown', 'latex' or 'text'";
+            return Err(PyValueError::new_err(format!("format: expected {expected}, found '{other}'")));
+        }
+    };
+    let (results, ceiling) = (parsed(&results)?, ceiling.map(parsed_result).transpose()?);
+    let tables = py.detach(|| mateval_report::tables::tables(&results, ceiling.as_ref(), protocol, grouping, format));
+    tables.map_err(failed)
+}
+
+/// The ranking of several results, as the file `leaderboard.json` of a leaderboard has it.
+#[pyfunction]
+pub fn rank(py: Python<'_>, results: Vec<String>, protocol: &str) -> PyResult<String> {
+    let (results, protocol) = (parsed(&results)?, protocol.to_owned());
+    let ranking = run_long(py, &Listener::none(), move |_| mateval_report::ranking::rank(&results, &protocol, false))?;
+    ranking.map(|ranking| json::to_text(&ranking)).map_err(failed)
+}
+
+fn parsed(texts: &[String]) -> PyResult<Vec<ResultFile>> {
+    texts.iter().map(|text| parsed_result(text)).collect()
+}
+
+fn parsed_result(text: &str) -> PyResult<ResultFile> {
+    json::parse(Path::new("result"), text.as_bytes()).map_err(failed)
 }
 
 struct ScoreTask {
@@ -168,7 +237,7 @@ fn measured(
         Pair::Colours(a, b) => of_colours(a, b, mask.as_ref()),
         Pair::Numbers(a, b) => of_numbers(a, b, mask.as_ref()),
     };
-    run_long(py, move |_| work())?.map_err(failed)
+    run_long(py, &Listener::none(), move |_| work())?.map_err(failed)
 }
 
 /// LPIPS 0.1 with AlexNet, of sRGB-encoded arrays of shape (height, width, 3). Where mask is given, the mean is over
@@ -192,7 +261,7 @@ pub fn lpips(
             None => Some(network.whole(&a, &b)?),
         })
     };
-    run_long(py, move |_| work())?.map_err(failed)
+    run_long(py, &Listener::none(), move |_| work())?.map_err(failed)
 }
 
 /// The network, which is loaded once.

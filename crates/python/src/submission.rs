@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{MapInput, Numbers};
-use crate::dataset::{Dataset, quoted, scene_place};
+use crate::dataset::{opened, quoted, scene_place};
 use crate::long_work::{failed, unknown_id};
 
 /// Writes a submission. Its folder appears when the `with` block ends without an exception, or when `close` is called;
@@ -53,13 +53,13 @@ impl Drop for OpenFolder {
 
 #[pymethods]
 impl Submission {
-    /// Starts a submission to the dataset in the folder `out`, which must not exist.
+    /// Starts a submission to the dataset, open or the path of its folder, in the folder `out`, which must not exist.
     #[new]
     #[pyo3(signature = (out, dataset, *, method, description=String::new(), url=None, licence=None, cost=None, force=false))]
     #[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         out: PathBuf,
-        dataset: &Dataset,
+        dataset: &Bound<'_, PyAny>,
         method: String,
         description: String,
         url: Option<String>,
@@ -67,7 +67,7 @@ impl Submission {
         cost: Option<Bound<'_, PyDict>>,
         force: bool,
     ) -> PyResult<Self> {
-        let dataset = Arc::clone(&dataset.0);
+        let dataset = opened(dataset)?;
         let file = SubmissionFile {
             format: SUBMISSION_FORMAT.to_owned(),
             method,

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{plane, read_picture, rows, triples};
 use crate::instance::SceneSource;
-use crate::long_work::{failed, withheld};
+use crate::long_work::{failed, shown_in_notebook, withheld};
 
 /// A view of a scene. Its pictures are read from their files at each access.
 #[pyclass(frozen, module = "mateval")]
@@ -51,7 +51,7 @@ impl View {
     }
 
     fn ids<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray2<u16>>> {
-        plane(py, &read_picture(py, self.path(name), &self.file().camera, png_io::read_ids)?)
+        plane(py, read_picture(py, self.path(name), &self.file().camera, png_io::read_ids)?)
     }
 }
 
@@ -92,7 +92,7 @@ impl View {
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.check_input("rgb")?;
         let picture = read_picture(py, self.path("rgb.exr"), &self.file().camera, exr_io::read_linear)?;
-        triples(py, &picture, |LinearRgb(rgb)| rgb)
+        triples(py, picture, |LinearRgb(rgb)| rgb)
     }
 
     /// The photo after exposure, clipped, sRGB: (height, width, 3), uint8. Only of the input view.
@@ -100,13 +100,13 @@ impl View {
     fn preview<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         self.check_input("preview")?;
         let picture = read_picture(py, self.path("rgb.png"), &self.file().camera, png_io::read_rgb_bytes)?;
-        triples(py, &picture, |rgb| rgb)
+        triples(py, picture, |rgb| rgb)
     }
 
     /// Depth along the camera's axis, not along the ray, in metres; 0 where nothing is hit: (height, width), float32.
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        plane(py, &read_picture(py, self.path("depth.exr"), &self.file().camera, exr_io::read_scalar)?)
+        plane(py, read_picture(py, self.path("depth.exr"), &self.file().camera, exr_io::read_scalar)?)
     }
 
     /// Shading normals in world space, of unit length, turned to the camera's side; 0 where nothing is hit: (height,
@@ -114,7 +114,7 @@ impl View {
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let picture = read_picture(py, self.path("normal.exr"), &self.file().camera, exr_io::read_normal)?;
-        triples(py, &picture, |Normal(xyz)| xyz)
+        triples(py, picture, |Normal(xyz)| xyz)
     }
 
     /// `Instance.index` of each pixel; 0 where nothing is hit: (height, width), uint16.
@@ -132,7 +132,7 @@ impl View {
     /// Whether each pixel counts: (height, width), bool.
     #[getter]
     fn valid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        plane(py, &self.mask(py, "valid.png")?)
+        plane(py, self.mask(py, "valid.png")?)
     }
 
     /// Whether each pixel is valid and shows a point that the input view does not; nowhere in the input view itself:
@@ -141,9 +141,20 @@ impl View {
     fn unobserved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         if self.file().id.as_str() == INPUT {
             let k = &self.file().camera.intrinsics;
-            return plane(py, &Picture::filled(k.width as usize, k.height as usize, false));
+            return plane(py, Picture::filled(k.width as usize, k.height as usize, false));
         }
-        plane(py, &self.mask(py, "unobserved.png")?)
+        plane(py, self.mask(py, "unobserved.png")?)
+    }
+
+    /// The paths of a pickled view: the copy opens the same folder.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (PathBuf, String, String))> {
+        let reopen = py.import("mateval.dataset")?.getattr("reopened_view")?;
+        let root = std::path::absolute(&self.source.dataset.root)?;
+        Ok((reopen, (root, self.source.file().id.to_string(), self.id().to_owned())))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown_in_notebook(slf, "view")
     }
 
     /// The ground truth. Raises `mateval.Withheld` where the dataset does not hold it.
@@ -178,11 +189,11 @@ impl Truth {
 
     fn colours<'py>(&self, py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let picture = read_picture(py, path, &self.view().camera, exr_io::read_linear)?;
-        triples(py, &picture, |LinearRgb(rgb)| rgb)
+        triples(py, picture, |LinearRgb(rgb)| rgb)
     }
 
     fn numbers<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        plane(py, &read_picture(py, self.path(name), &self.view().camera, exr_io::read_scalar)?)
+        plane(py, read_picture(py, self.path(name), &self.view().camera, exr_io::read_scalar)?)
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -219,11 +230,11 @@ impl Truth {
     /// Whether each pixel is valid and metallic or smooth: (height, width), bool.
     #[getter]
     fn specular_region<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        plane(py, &read_picture(py, self.path("specular_region.png"), &self.view().camera, png_io::read_mask)?)
+        plane(py, read_picture(py, self.path("specular_region.png"), &self.view().camera, png_io::read_mask)?)
     }
 
     /// The picture of the photo's renderer, linear radiance in Rec. 709 before exposure: (height, width, 3), float32.
-    /// Raises MatEvalError where the scene is not rendered.
+    /// Raises `mateval.Error` where the scene is not rendered.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let dataset = &self.source.dataset;

@@ -184,3 +184,35 @@ def test_views_are_a_map_style_dataset(dataset, scene):
         mateval.torch.Views(dataset, fields="rgb")
     with pytest.raises(mateval.UnknownId, match="has no view 'left'"):
         mateval.torch.Views(dataset, views=["left"])
+
+
+def test_scenes_are_found_by_their_place(eight_scenes):
+    eight = mateval.open(eight_scenes)
+    assert eight[0].id == eight[-8].id == "room1" and [scene.id for scene in eight[2:4]] == ["room3", "room4"]
+    with pytest.raises(IndexError, match="has 8 scenes, found the index 8"):
+        eight[8]
+    assert mateval.open(eight) is eight and 0 not in eight
+
+
+def test_scenes_and_views_can_be_pickled(scene):
+    copy, view = pickle.loads(pickle.dumps((scene, scene.views["up_left"])))
+    assert copy.id == scene.id and view.id == "up_left"
+    assert np.array_equal(view.depth, scene.views["up_left"].depth)
+
+
+def test_scenes_for_loaders_hold_all_their_views(root, scene):
+    item = mateval.torch.Scenes(root, fields=["rgb", "depth", "truth.albedo"])[0]
+    assert item["scene"] == "room" and item["view"] == list(scene.views)
+    assert item["rgb"].shape == (HEIGHT, WIDTH, 3)
+    assert item["depth"].shape == (5, HEIGHT, WIDTH) and item["truth.albedo"].shape == (5, HEIGHT, WIDTH, 3)
+    assert np.array_equal(item["depth"][2], list(scene.views.values())[2].depth)
+    assert mateval.torch.Scenes(root, fields=["valid"], views=["input"])[0]["valid"].shape == (1, HEIGHT, WIDTH)
+    with pytest.raises(mateval.UnknownId, match="no view 'down'"):
+        mateval.torch.Scenes(root, views=["down"])
+
+
+def test_notebooks_show_scenes_and_views(scene, withheld):
+    assert scene._repr_html_().count("data:image/png;base64,") == 1 and "instances" in scene._repr_html_()
+    assert "the true albedo" in scene.views["up_left"]._repr_html_()
+    without = mateval.open(withheld)["room"].views["up_left"]._repr_html_()
+    assert "withheld" in without and "<img" not in without

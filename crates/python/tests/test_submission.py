@@ -333,3 +333,119 @@ def test_of_two_submissions_at_one_place_one_stays_whole(dataset, scene, tmp_pat
         second.close()
     assert json.loads((tmp_path / "out/submission.json").read_text())["method"] == ids[0]
     assert [path.name for path in (tmp_path / "out/scenes/room").iterdir()] == ids[:1]
+
+
+class Tensor:
+    """As PyTorch's: on another device, with a gradient."""
+
+    def __init__(self, array, place="cuda"):
+        self.array, self.place, self.dtype = array, place, f"torch.{array.dtype}"
+
+    def detach(self):
+        return Tensor(self.array, self.place)
+
+    def cpu(self):
+        return Tensor(self.array, "cpu")
+
+    def numpy(self):
+        assert self.place == "cpu"
+        return self.array
+
+
+def test_what_method_authors_pass_is_taken_or_explained(scene):
+    photo = np.clip(scene.input.rgb * np.float32(scene.exposure), 0, 1)
+    plain = mateval.lift(scene, base_color=photo)
+    name = next(iter(plain))
+    read_only = photo.copy()
+    read_only.flags.writeable = False
+    backwards = photo[::-1, ::-1].copy()[::-1, ::-1]
+    for same in (Tensor(photo), read_only, backwards, photo.astype(np.float64)):
+        assert np.array_equal(mateval.lift(scene, base_color=same)[name].base_color, plain[name].base_color)
+    srgb = np.where(photo <= 0.0031308, 12.92 * photo, 1.055 * photo ** (1 / 2.4) - 0.055)
+    encoded = mateval.lift(scene, base_color=srgb, encoding="srgb")[name].base_color
+    assert np.abs(encoded.astype(int) - plain[name].base_color).max() <= 1
+    for wrong, text in (
+        ({"base_color": photo.transpose(2, 0, 1)}, r"found \[3, 72, 96\]; `numpy.moveaxis\(array, 0, -1\)`"),
+        ({"base_color": photo[None]}, r"found \[1, 72, 96, 3\]; `array\[0\]` drops the first axis"),
+        ({"base_color": photo * 200}, "divide values of 0 to 255 by 255, or pass them as uint8"),
+        ({"base_color": photo, "roughness": photo[..., :1]}, r"drops the last axis"),
+        ({"base_color": photo, "encoding": "gamma"}, "encoding: expected 'linear' or 'srgb', found 'gamma'"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            mateval.lift(scene, **wrong)
+    with pytest.raises(TypeError, match="base_color: expected a NumPy array or a tensor, found list"):
+        mateval.lift(scene, base_color=[[1.0]])
+
+
+def test_progress_is_reported_and_ends_the_work(scene, capsys):
+    photo, heard = scene.input.preview, []
+    mateval.lift(scene, base_color=photo, progress=lambda *report: heard.append(report))
+    assert heard and all(0 <= done <= total for _, done, total in heard), heard
+
+    def fails(name, done, total):
+        raise KeyError(name)
+
+    with pytest.raises(KeyError):
+        mateval.procedural(scene, base_color=photo, progress=fails)
+    assert capsys.readouterr().err == ""
+    mateval.lift(scene, base_color=photo, progress=True)
+    assert "[####" in capsys.readouterr().err
+    with pytest.raises(TypeError, match="progress: expected None, True, False or a callable, found 3"):
+        mateval.lift(scene, base_color=photo, progress=3)
+
+
+@pytest.fixture(scope="module")
+def scores(root, nn, command, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scores")
+    command("baseline", "grey", "--dataset", root, "--out", folder / "grey")
+    return [mateval.score(folder / "grey", root), mateval.score(nn, root)], folder
+
+
+def test_results_are_saved_loaded_and_compared(scores, tmp_path, monkeypatch):
+    (grey, nn), _ = scores
+    nn.save(tmp_path / "nn.json")
+    with pytest.raises(FileExistsError):
+        nn.save(tmp_path / "nn.json")
+    assert dict(mateval.Result.load(tmp_path / "nn.json")) == dict(nn)
+    (tmp_path / "nn.json").write_text(nn.json.replace('"albedo.novel.psnr": ', '"albedo.novel.psnr": 1', 1))
+    with pytest.raises(mateval.Error):
+        mateval.Result.load(tmp_path / "nn.json")
+    assert "Albedo PSNR" in nn._repr_html_()
+    with pytest.raises(mateval.UnknownId, match="no protocol 'paper'; it has 'mateval-3'"):
+        mateval.Result(nn.json, "paper")
+
+    pandas = pytest.importorskip("pandas")
+    ranked = mateval.rank([grey, nn])
+    assert list(ranked["method"]) == [nn.method, "grey"] and list(ranked["place"]) == [1, 2]
+    assert ranked["value"][0] == nn["albedo.novel.psnr"] and pandas.isna(ranked["low"][0])
+    table = mateval.tables([grey, nn])["Albedo, novel views"]
+    assert table.loc["grey", "Albedo PSNR \u2191"] == grey["albedo.novel.psnr"]
+    assert "| grey |" in mateval.tables([grey, nn], format="markdown")
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert mateval.rank([grey, nn])[0]["method"] == nn.method
+    rows = mateval.tables([grey, nn], ceiling=nn, by="scene")["Albedo, novel views"]
+    assert [(row["Scene"], row["method"]) for row in rows][0] == ("room", "grey"), rows
+    with pytest.raises(mateval.UnknownId, match="expected a key such as 'albedo.novel.psnr'"):
+        mateval.rank([nn], key="albedo.novel.psn")
+    with pytest.raises(TypeError, match="Result.load reads a file"):
+        mateval.tables(["nn.json"])
+
+
+def test_a_scene_is_rendered_with_any_maps(scene, nn, scores):
+    truth = scene.input.truth
+    maps = mateval.lift(scene, base_color=truth.albedo, roughness=truth.roughness, metallic=truth.metallic)
+    ours = scene.render(maps, samples=1, progress=False)
+    assert list(ours) == list(scene.views) and ours["input"].dtype == np.uint8
+    given = scene.render(nn, samples=1)
+    assert all(np.array_equal(ours[view], given[view]) for view in ours)
+    black = scene.render({next(iter(maps)): {"base_color": np.zeros((64, 64, 3), np.uint8)}}, samples=1)
+    assert not np.array_equal(black["input"], ours["input"])
+    assert not np.array_equal(scene.render(nn, light="warm_cool", samples=1)["input"], ours["input"])
+    with pytest.raises(ValueError, match="light: expected 'true', 'warm_cool'"):
+        scene.render(nn, light="sun")
+
+
+def test_exceptions_speak_python(dataset, nn):
+    with pytest.raises(mateval.Error, match="force=True") as raised:
+        mateval.Submission(nn, dataset, method="x")
+    assert "--" not in str(raised.value)

@@ -1,35 +1,42 @@
-"""The tutorial runs as it is, and prints what the score says."""
+"""The tutorial runs as it is, and shows what its scores say."""
 
+import json
 import pathlib
-import re
 import subprocess
 import sys
 
+import pytest
+
 import mateval
 
-TUTORIAL = pathlib.Path(__file__).parent.parent / "tutorial.py"
+TUTORIAL = pathlib.Path(__file__).parent.parent / "tutorial.ipynb"
 
 
-def test_the_tutorial_ends_with_the_scores_of_its_submission(root, dataset, command, tmp_path):
-    out = tmp_path / "first"
-    done = subprocess.run([sys.executable, TUTORIAL, root, out], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "within the photo's frame" in done.stdout
-    novel = re.search(r"novel: (\S+)", done.stdout)
-    assert novel and novel[1] == f"{mateval.score(out, dataset)['albedo.novel.psnr']:.2f}"
-    explained = re.search(r"mateval (eval explain .*)", done.stdout)
-    assert explained and "squared error" in command(*explained[1].split()).stdout
-    # A second run replaces the submission.
-    assert mateval.lint(out, dataset).good
+def test_the_tutorial_ends_with_scores_and_pictures(root, command, tmp_path, monkeypatch):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    notebook = nbformat.read(TUTORIAL, as_version=4)
+    monkeypatch.setenv("MATEVAL_DATASET", str(root))
+    client = nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}})
+    client.execute()
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    outputs = [output for cell in cells for output in cell.outputs]
+    assert not [output for output in outputs if output.output_type == "stream" and output.name == "stderr"]
+    pictures = [output.data["text/html"].count("<img") for output in outputs if "text/html" in output.get("data", {})]
+    assert sum(pictures) >= 7, pictures
+    result = mateval.Result.load(tmp_path / "first.json")
+    shown = "".join(output.text for output in outputs if output.output_type == "stream")
+    assert f"albedo, novel: {result['albedo.novel.psnr']:.2f} dB" in shown
+    explain = next(line for line in shown.splitlines() if line.startswith("mateval eval explain"))
+    monkeypatch.chdir(tmp_path)
+    assert "squared error" in command(*explain.split()[1:]).stdout
 
 
-def test_a_dataset_that_does_not_exist_ends_it(tmp_path):
-    done = subprocess.run([sys.executable, TUTORIAL, tmp_path / "none", tmp_path / "out"], capture_output=True, text=True)
-    assert done.returncode != 0 and "none" in done.stderr
-    assert not (tmp_path / "out").exists()
-
-
-def test_without_the_truth_it_ends_after_the_check(withheld, tmp_path):
-    done = subprocess.run([sys.executable, TUTORIAL, withheld, tmp_path / "out"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "the truth is withheld" in done.stdout and "PSNR" not in done.stdout
+def test_the_tutorial_is_typed(tmp_path):
+    pytest.importorskip("mypy")
+    cells = json.loads(TUTORIAL.read_text())["cells"]
+    program = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+    (tmp_path / "tutorial.py").write_text(program)
+    checked = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "tutorial.py"], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert checked.returncode == 0, checked.stdout

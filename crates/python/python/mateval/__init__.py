@@ -14,12 +14,14 @@ Arrays are NumPy's, in rows from the top left. Colours are linear Rec. 709 where
 integers. Lengths are metres, +Y is up.
 """
 
-from . import metrics
+from . import _core, metrics, torch
 from ._core import Camera, Delit, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, delight, lift, procedural
 from .by_id import ById
 from .dataset import Dataset, open
 from .errors import Error, UnknownId, Withheld
-from .reports import LintReport, Result, lint, score
+from .reports import LintReport, Result, lint, rank, score, tables
+
+__version__ = _core.__version__
 
 __all__ = [
     "ById",
@@ -45,5 +47,8 @@ __all__ = [
     "metrics",
     "open",
     "procedural",
+    "rank",
     "score",
+    "tables",
+    "torch",
 ]

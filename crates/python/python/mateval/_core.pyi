@@ -2,7 +2,7 @@
 
 import os
 import pathlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Optional, Union, final
 
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from typing_extensions import Self, disjoint_base
 
 from .by_id import ById
+from .progress import Progress
 
 __all__ = [
     "Camera",
@@ -29,11 +30,19 @@ __all__ = [
     "lint",
     "lpips",
     "main",
+    "png",
     "procedural",
     "psnr",
+    "rank",
+    "read_result",
+    "render",
     "score",
+    "srgb_bytes",
     "ssim",
+    "tables",
 ]
+
+__version__: str
 
 _Path = Union[str, os.PathLike[str]]
 _Floats = npt.NDArray[np.float32]
@@ -41,7 +50,8 @@ _Doubles = npt.NDArray[np.float64]
 _Bytes = npt.NDArray[np.uint8]
 _Ids = npt.NDArray[np.uint16]
 _Mask = npt.NDArray[np.bool_]
-_Input = npt.NDArray[Any]
+# Arrays of NumPy, and tensors of other libraries.
+_Input = Any
 
 @disjoint_base
 class Dataset:
@@ -80,6 +90,16 @@ class Scene:
     def views(self) -> ById[View]: ...
     @property
     def input(self) -> View: ...
+    def render(
+        self,
+        maps: Union[Mapping[str, Any], _Path],
+        *,
+        light: str = "true",
+        samples: int = 16,
+        progress: Progress = None,
+    ) -> dict[str, _Bytes]: ...
+    def __reduce__(self) -> tuple[Any, tuple[str, str]]: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Instance:
@@ -155,6 +175,8 @@ class View:
     def unobserved(self) -> _Mask: ...
     @property
     def truth(self) -> Truth: ...
+    def __reduce__(self) -> tuple[Any, tuple[str, str, str]]: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Truth:
@@ -194,6 +216,7 @@ class Maps:
     def metallic(self) -> Optional[_Bytes]: ...
     @property
     def seen(self) -> Optional[_Mask]: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Delit:
@@ -217,7 +240,7 @@ class Submission:
     def __new__(
         cls,
         out: _Path,
-        dataset: Dataset,
+        dataset: Union[Dataset, _Path],
         *,
         method: str,
         description: str = ...,
@@ -246,17 +269,19 @@ class Submission:
         /,
     ) -> None: ...
 
-def delight(scene: Scene, *, lights: str = "room") -> Delit: ...
+def delight(scene: Scene, *, lights: str = "room", progress: Progress = None) -> Delit: ...
 def lift(
     scene: Scene,
     *,
     base_color: Optional[_Input] = None,
     roughness: Optional[_Input] = None,
     metallic: Optional[_Input] = None,
+    encoding: Optional[str] = None,
     neighbours: int = 1,
     normal_weight: float = 0.0,
     any_instance: bool = False,
     atlas_size: Optional[int] = None,
+    progress: Progress = None,
 ) -> dict[str, Maps]: ...
 def procedural(
     scene: Scene,
@@ -264,11 +289,13 @@ def procedural(
     base_color: Optional[_Input] = None,
     roughness: Optional[_Input] = None,
     metallic: Optional[_Input] = None,
+    encoding: Optional[str] = None,
     part_set: Optional[str] = None,
     keep_seen: bool = False,
     detail: float = 1.0,
+    progress: Progress = None,
 ) -> dict[str, Maps]: ...
-def lint(submission: _Path, dataset: Dataset) -> tuple[str, str]: ...
+def lint(submission: _Path, dataset: Dataset, *, progress: Progress) -> tuple[str, str]: ...
 def score(
     submission: _Path,
     dataset: Dataset,
@@ -276,7 +303,18 @@ def score(
     scenes: Sequence[str],
     protocol: str,
     cache: Optional[_Path],
+    progress: Progress,
 ) -> str: ...
+def read_result(path: _Path) -> str: ...
+def tables(
+    results: Sequence[str], ceiling: Optional[str], protocol: str, by: str, format: str
+) -> str: ...
+def rank(results: Sequence[str], protocol: str) -> str: ...
+def render(
+    scene: Scene, submission: _Path, light: str, samples: int, progress: Progress
+) -> tuple[dict[str, _Bytes], dict[str, _Bytes]]: ...
+def png(picture: _Bytes) -> bytes: ...
+def srgb_bytes(picture: _Floats) -> _Bytes: ...
 def psnr(prediction: _Input, reference: _Input, mask: Optional[_Mask] = None) -> Optional[float]: ...
 def ssim(prediction: _Input, reference: _Input, mask: Optional[_Mask] = None) -> Optional[float]: ...
 def lpips(prediction: _Input, reference: _Input, mask: Optional[_Mask] = None) -> Optional[float]: ...

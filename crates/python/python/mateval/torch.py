@@ -1,55 +1,95 @@
-"""The views of a dataset as PyTorch's data loaders take them. PyTorch is not imported."""
+"""The views and scenes of a dataset as PyTorch's data loaders take them. PyTorch is not imported."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable
 from typing import Any
 
 from . import _core
-from .dataset import Dataset
+from .dataset import Dataset, DatasetOrPath, open
 
 
 class Views:
     """A map-style dataset for ``torch.utils.data.DataLoader``: one item a view, a dictionary of arrays.
 
-    ``fields`` are names of ``View``'s arrays, or of ``Truth``'s as in ``truth.albedo``. ``views`` are the ids of the views
-    that are taken from every scene; by default the input view alone, since methods see no other photo. An item also holds
-    the ids ``scene`` and ``view``. Pictures of different scenes may differ in size: such batches need a ``collate_fn``.
+    ``dataset`` is a dataset or its folder. ``fields`` are names of ``View``'s arrays, or of ``Truth``'s as in
+    ``truth.albedo``. ``views`` are the ids of the views that are taken from every scene; by default the input view alone,
+    since methods see no other photo. An item also holds the ids ``scene`` and ``view``. Pictures of different scenes may
+    differ in size: such batches need a ``collate_fn``.
+
+    >>> views = mateval.torch.Views("DATASET", fields=["rgb", "depth", "normal", "valid", "truth.albedo"])
+    >>> for batch in torch.utils.data.DataLoader(views, batch_size=8, num_workers=4):
+    ...     photo, albedo = batch["rgb"], batch["truth.albedo"]  # (8, height, width, 3), float32, linear
     """
 
     def __init__(
         self,
-        dataset: Dataset,
+        dataset: DatasetOrPath,
         fields: Iterable[str] = ("rgb", "depth", "valid"),
         views: Iterable[str] = ("input",),
     ) -> None:
-        for name, given in (("fields", fields), ("views", views)):
-            if isinstance(given, str):
-                raise TypeError(f"{name}: expected a list such as ['{given}'], found the text '{given}'")
-        self.dataset = dataset
-        self.fields = tuple(fields)
-        for field in self.fields:
-            _check_field(field)
-        views = tuple(views)
+        self.dataset: Dataset = open(dataset)
+        self.fields = _fields(fields)
+        views = _list("views", views)
         # An unknown id fails here, not in a worker.
-        self._places = [(scene, dataset[scene].views[view].id) for scene in dataset for view in views]
+        self._places = [(id, scene.views[view].id) for id, scene in self.dataset.items() for view in views]
 
     def __len__(self) -> int:
         return len(self._places)
 
     def __getitem__(self, index: int) -> dict[str, Any]:
-        scene, id = self._places[index]
+        scene, id = self._places[operator.index(index)]
         view = self.dataset[scene].views[id]
-        return {"scene": scene, "view": id, **{field: _field(view, field) for field in self.fields}}
+        return {"scene": scene, "view": id, **{field: operator.attrgetter(field)(view) for field in self.fields}}
 
 
-def _check_field(field: str) -> None:
-    holder, name = (_core.Truth, field[len("truth.") :]) if field.startswith("truth.") else (_core.View, field)
-    if name.startswith("_") or not hasattr(holder, name):
-        raise ValueError(f"fields: expected arrays of View, or of Truth as in 'truth.albedo', found '{field}'")
+class Scenes:
+    """The same with one item a scene: each field is an array of all its views, or of those named, in the order of their
+    ids in ``view``. The photo, ``rgb`` and ``preview``, exists for the input view alone and has no such axis.
+    """
+
+    def __init__(
+        self,
+        dataset: DatasetOrPath,
+        fields: Iterable[str] = ("rgb", "depth", "valid"),
+        views: Iterable[str] | None = None,
+    ) -> None:
+        self.dataset: Dataset = open(dataset)
+        self.fields = _fields(fields)
+        self.views = None if views is None else _list("views", views)
+        self._ids = list(self.dataset)
+        for scene in self.dataset.values():
+            for view in self.views or ():
+                _ = scene.views[view]
+
+    def __len__(self) -> int:
+        return len(self._ids)
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        import numpy as np  # `import mateval` does without.
+
+        scene = self.dataset[self._ids[operator.index(index)]]
+        ids = list(scene.views) if self.views is None else list(self.views)
+        item: dict[str, Any] = {"scene": scene.id, "view": ids}
+        for field in self.fields:
+            get = operator.attrgetter(field)
+            is_photo = field in ("rgb", "preview")
+            item[field] = get(scene.input) if is_photo else np.stack([get(scene.views[id]) for id in ids])
+        return item
 
 
-def _field(view: Any, field: str) -> Any:
-    for name in field.split("."):
-        view = getattr(view, name)
-    return view
+def _fields(given: Iterable[str]) -> tuple[str, ...]:
+    fields = _list("fields", given)
+    for field in fields:
+        in_truth = field.startswith("truth.")
+        holder, name = (_core.Truth, field[len("truth.") :]) if in_truth else (_core.View, field)
+        if name.startswith("_") or not hasattr(holder, name):
+            raise ValueError(f"fields: expected arrays of View, or of Truth as in 'truth.albedo', found '{field}'")
+    return fields
+
+
+def _list(name: str, given: Iterable[str]) -> tuple[str, ...]:
+    if isinstance(given, str):
+        raise TypeError(f"{name}: expected a list such as ['{given}'], found the text '{given}'")
+    return tuple(given)
