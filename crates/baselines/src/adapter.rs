@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::submission::{Map, StoredEncoding};
 use mateval_files::FileError;
-use mateval_files::untrusted::in_words;
-use mateval_image::texture_io::read_texture;
-use mateval_image::{LinearRgb, Picture, Texture, Wrap, texture_io};
+use mateval_files::untrusted::{hint, in_words, read_at_most, without_mark};
+use mateval_image::limits::read_file;
+use mateval_image::texture_io::{Encoding, FewerBits, is_turned, texture_and_alpha_of_bytes, transparent_share};
+use mateval_image::{LinearRgb, Picture, Wrap};
 use serde::Deserialize;
 
 use crate::error::BaselineError;
@@ -32,10 +33,12 @@ const BUILT_IN: [(&str, &str); 13] = [
     ("rgbx", include_str!("../adapters/rgbx.toml")),
 ];
 
+/// The largest file of an adapter, in bytes.
+const MAX_ADAPTER_BYTES: u64 = 1 << 20;
 /// The endings of files that may hold a map.
-const PICTURES: [&str; 18] = [
+const PICTURES: [&str; 27] = [
     "png", "jpg", "jpeg", "webp", "exr", "hdr", "npy", "tif", "tiff", "bmp", "gif", "tga", "npz", "pfm", "mat", "pt",
-    "pth", "pkl",
+    "pth", "pkl", "avif", "heic", "heif", "jxl", "jp2", "dds", "ktx", "ktx2", "psd",
 ];
 /// The deepest folder, below that of the estimates, in which such files are looked for.
 const DEEPEST: usize = 4;
@@ -68,7 +71,10 @@ impl Adapter {
             let why = format!("is neither a built-in adapter nor a file; expected one of {known}, or a TOML file");
             return Err(BaselineError::unusable(path, why));
         }
-        Self::parse(&std::fs::read_to_string(path).map_err(FileError::io("read", path))?, path)
+        let bytes = read_at_most(path, MAX_ADAPTER_BYTES).map_err(FileError::io("read", path))?;
+        let text = std::str::from_utf8(without_mark(&bytes));
+        let text = text.map_err(|_| BaselineError::unusable(path, format!("is not UTF-8{}", hint(&bytes))))?;
+        Self::parse(text, path)
     }
 
     /// The names of the built-in adapters.
@@ -165,9 +171,20 @@ impl Adapter {
 
     /// Reads a scene's pictures below `folder`, which must all have one size.
     pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
+        Ok(self.read_and_remark(folder, scene)?.0)
+    }
+
+    /// Reads a scene's pictures, and says what may be wrong with pictures that can be read.
+    pub(crate) fn read_and_remark(
+        &self,
+        folder: &Path,
+        scene: &str,
+    ) -> Result<(Estimate, Vec<(RemarkKind, String)>), BaselineError> {
         let mut estimate = Estimate { placement: Some(self.placement), ..Estimate::default() };
+        let mut all_remarks = Vec::new();
         for (map, file, channel) in self.maps() {
-            let Some(picture) = file.read(folder, scene, map, channel)? else { continue };
+            let Some(AdaptedPicture { picture, remarks }) = file.read(folder, scene, map, channel)? else { continue };
+            all_remarks.extend(remarks);
             let scalar = || picture.map(|LinearRgb(rgb)| rgb[0]);
             match map {
                 Map::BaseColor => estimate.base_color = Some(picture),
@@ -175,7 +192,7 @@ impl Adapter {
                 Map::Metallic => estimate.metallic = Some(scalar()),
             }
         }
-        estimate.of_one_size(folder, scene)
+        Ok((estimate.of_one_size(folder, scene)?, all_remarks))
     }
 }
 
@@ -187,14 +204,9 @@ const BRIGHT: f32 = 1.5;
 /// A larger share of pixels above [`BRIGHT`] has another range than the adapter states, unless its scale is free.
 const MOST_BRIGHT: f64 = 0.01;
 
-/// The largest 16-bit integer.
-const LARGEST_WORD: f32 = 65535.0;
-/// 16-bit integers that end between these numbers are bytes that were saved as words.
-const LARGEST_BYTE: std::ops::RangeInclusive<f32> = 128.0..=255.0;
-
 /// A map of base colour or roughness whose largest stored number is above 0 and below this has another range than the
 /// adapter states: numbers of 0 to 255 that were divided twice, or 0 and 1 as bytes. Networks put noise of this size into
-/// metallic maps.
+/// metallic maps, so that for these it is a remark.
 const LEAST_LARGEST: f32 = 1.5 / 255.0;
 
 /// Numbers below this, in the adapter's range, are more than the noise of a network.
@@ -250,28 +262,77 @@ pub(crate) struct Stored {
     path: PathBuf,
     /// Its numbers, with those of `range` mapped to 0 and 1.
     pub(crate) numbers: Picture<[f32; 3]>,
+    /// The share of pixels whose alpha is below 1.
+    transparent: f64,
+}
+
+/// A map of an estimate, and what may be wrong with it.
+#[derive(Debug)]
+pub(crate) struct AdaptedPicture {
+    /// Linear; a scalar is repeated in all three channels.
+    pub(crate) picture: Picture<LinearRgb>,
+    pub(crate) remarks: Vec<(RemarkKind, String)>,
+}
+
+/// What is done with pictures that their author may not expect, or what may be wrong with them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum RemarkKind {
+    Stretched,
+    Transparent,
+    Black,
+    NearlyZero,
+}
+
+impl RemarkKind {
+    /// The sentence before the example.
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Stretched => "pictures are stretched to the proportions of the input view",
+            Self::Transparent => "pictures have pixels with alpha below 1, whose colours are used as they are stored",
+            Self::Black => {
+                "pictures are 0 everywhere, as a method writes them that failed or whose filter refused the photo"
+            }
+            Self::NearlyZero => {
+                "metallic is nearly 0 everywhere, which is noise, or another range than the adapter states"
+            }
+        }
+    }
 }
 
 impl AdaptedFile {
-    /// The linear picture of `map`; `channel` selects a scalar, which is repeated in all three channels. Absent if an
-    /// optional file is missing.
+    /// The picture of `map`; `channel` selects a scalar. Absent if an optional file is missing.
     pub(crate) fn read(
         &self,
         folder: &Path,
         scene: &str,
         map: Map,
         channel: Option<Channel>,
-    ) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
-        let Some(Stored { path, numbers }) = self.stored(folder, scene, channel)? else { return Ok(None) };
+    ) -> Result<Option<AdaptedPicture>, BaselineError> {
+        let Some(Stored { path, numbers, transparent }) = self.stored(folder, scene, map, channel)? else {
+            return Ok(None);
+        };
         let refused = |why: String| Err(BaselineError::unusable(&path, why));
         let largest = numbers.pixels().iter().flatten().copied().fold(f32::NEG_INFINITY, f32::max);
-        if map != Map::Metallic && self.scale == Scale::Absolute && 0.0 < largest && largest < LEAST_LARGEST {
+        let mut remarks = Vec::new();
+        if transparent > 0.0 {
+            let percent = 100.0 * transparent;
+            let some = format!("{percent:.1} % of '{}'; save it without alpha if that is meant", path.display());
+            remarks.push((RemarkKind::Transparent, some));
+        }
+        if map != Map::Metallic && largest <= 0.0 {
+            remarks.push((RemarkKind::Black, format!("'{}'", path.display())));
+        }
+        if self.scale == Scale::Absolute && 0.0 < largest && largest < LEAST_LARGEST {
             let [low, high] = self.range;
             let high = low + largest * (high - low);
-            return refused(format!(
-                "holds no number above {largest}, in the adapter's `range`; expected 0 to 1; if {high} stands for 1, write \
-                 range = [{low:.1}, {high}] below the map in the adapter"
-            ));
+            let why = format!(
+                "holds no number above {largest:?}, in the adapter's `range`; expected 0 to 1; if {high:?} stands for 1, \
+                 write range = [{low:.1}, {high:?}] below the map in the adapter"
+            );
+            if map != Map::Metallic {
+                return refused(why);
+            }
+            remarks.push((RemarkKind::NearlyZero, format!("'{}' {why}", path.display())));
         }
         let below = numbers.pixels().iter().filter(|rgb| rgb.iter().any(|value| *value < LEAST)).count();
         if below as f64 > MOST_BELOW * numbers.pixels().len() as f64 {
@@ -309,15 +370,16 @@ impl AdaptedFile {
                 100.0 * share
             ));
         }
-        Ok(Some(picture))
+        Ok(Some(AdaptedPicture { picture, remarks }))
     }
 
-    /// The stored numbers; absent if an optional file is missing. Fails where 16-bit integers are those of bytes and
-    /// the adapter does not say so, since all values would be near 0.
+    /// The stored numbers; absent if an optional file is missing. Fails where 16-bit integers are those of fewer bits and
+    /// the adapter does not say so, since all values would be near 0, and where the picture asks to be turned.
     pub(crate) fn stored(
         &self,
         folder: &Path,
         scene: &str,
+        map: Map,
         channel: Option<Channel>,
     ) -> Result<Option<Stored>, BaselineError> {
         let path = match self.path(folder, scene) {
@@ -325,16 +387,25 @@ impl AdaptedFile {
             Err(_) if self.optional => return Ok(None),
             Err(searched) => return Err(no_estimate(&searched)),
         };
+        let bytes = read_file(&path)?;
+        if is_turned(&bytes) {
+            let why = "asks by its EXIF data to be turned or mirrored for display; save its pixels as the input view has \
+                       them, without EXIF data";
+            return Err(BaselineError::unusable(&path, why));
+        }
         // Read without decoding: the adapter states the encoding, of float files too.
-        let stored = read_texture(&path, texture_io::Encoding::Linear, Wrap::Clamp)?;
+        let (stored, alpha) = texture_and_alpha_of_bytes(&path, bytes, Encoding::Linear, Wrap::Clamp)?;
         if self.range == unit_range()
             && self.scale == Scale::Absolute
-            && let Some(largest) = largest_byte_of_words(&stored)
+            && let Some(words) = FewerBits::of(&stored)
+            // A metallic of a network may be as small throughout as other numbers of 10 and 12 bits.
+            && (map != Map::Metallic || words.bits == 8 || words.largest == words.full())
         {
-            let high = LARGEST_BYTE.end() / LARGEST_WORD;
+            let FewerBits { bits, largest } = words;
+            let (full, high) = (words.full(), f32::from(words.full()) / f32::from(u16::MAX));
             let why = format!(
-                "holds 16-bit integers that reach only {largest} of 65535; expected 65535 for 1; save them as 8-bit \
-                 integers, or write range = [0.0, {high}] (255 of 65535) below the map in the adapter"
+                "holds 16-bit integers that reach only {largest} of 65535, as those of {bits} bits do; expected 65535 for \
+                 1; scale them up, or write range = [0.0, {high}] ({full} of 65535) below the map in the adapter"
             );
             return Err(BaselineError::unusable(&path, why));
         }
@@ -345,7 +416,8 @@ impl AdaptedFile {
             let rgb = channel.map_or(rgb, |channel| [rgb[channel as usize]; 3]);
             rgb.map(|value| (value - low) / (high - low))
         });
-        Ok(Some(Stored { path, numbers }))
+        let transparent = alpha.map_or(0.0, |alpha| transparent_share(&alpha));
+        Ok(Some(Stored { path, numbers, transparent }))
     }
 
     /// The first path that exists, or else all that were searched.
@@ -361,21 +433,6 @@ pub(crate) fn no_estimate(searched: &[PathBuf]) -> BaselineError {
     let paths: Vec<String> = searched.iter().map(|path| format!("'{}'", path.display())).collect();
     let expected = paths.join(" or ");
     BaselineError::Unusable(format!("no estimate: expected {expected}; fix the adapter's `files`, or run the method"))
-}
-
-/// The largest number of 16-bit integers that are those of bytes; `None` for all other numbers.
-fn largest_byte_of_words(stored: &Texture) -> Option<u8> {
-    let mut largest: f32 = 0.0;
-    for (x, y) in (0..stored.height()).flat_map(|y| (0..stored.width()).map(move |x| (x, y))) {
-        for value in stored.texel(x, y).map(|value| value * LARGEST_WORD) {
-            let is_byte = (value - value.round()).abs() < 1e-3 && (0.0..=LARGEST_BYTE.end() + 1e-3).contains(&value);
-            if !is_byte {
-                return None;
-            }
-            largest = largest.max(value.round());
-        }
-    }
-    LARGEST_BYTE.contains(&largest).then_some(largest as u8)
 }
 
 /// After a picture of free scale is scaled, this share of its pixels has its largest channel at or below 1.
@@ -446,6 +503,20 @@ mod tests {
     }
 
     #[test]
+    fn adapters_in_other_encodings_are_read_or_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        let find = |bytes: Vec<u8>| {
+            std::fs::write(&path, bytes).unwrap();
+            Adapter::find(path.to_str().unwrap())
+        };
+        let text = "name = \"mine\"\n[base_color]\nfiles = [\"a.png\"]\nencoding = \"srgb\"\n";
+        assert_eq!(find(format!("\u{feff}{text}").into_bytes()).unwrap().name, "mine");
+        let utf16: Vec<u8> = "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+        assert!(find(utf16).unwrap_err().to_string().contains("UTF-16 text; save it as UTF-8"));
+    }
+
+    #[test]
     fn files_that_are_not_read_are_listed() {
         let folder = tempfile::tempdir().unwrap();
         for below in ["s/run/deep", "other"] {
@@ -489,8 +560,18 @@ mod tests {
 
     /// The picture in the folder's file of this name, whose adapter has these further lines.
     fn read(folder: &Path, file: &str, lines: &str) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
+        Ok(read_map(folder, file, lines, Map::BaseColor)?.map(|read| read.picture))
+    }
+
+    fn read_map(folder: &Path, file: &str, lines: &str, map: Map) -> Result<Option<AdaptedPicture>, BaselineError> {
         let text = format!("files = [\"{file}\"]\nencoding = \"linear\"\n{lines}");
-        toml::from_str::<AdaptedFile>(&text).unwrap().read(folder, "s", Map::BaseColor, None)
+        toml::from_str::<AdaptedFile>(&text).unwrap().read(folder, "s", map, None)
+    }
+
+    /// What is said of the picture in the folder's file `a.png`.
+    fn remarks(folder: &Path, map: Map) -> Vec<RemarkKind> {
+        let read = read_map(folder, "a.png", "", map).unwrap().unwrap();
+        read.remarks.into_iter().map(|(kind, _)| kind).collect()
     }
 
     #[test]
@@ -504,13 +585,67 @@ mod tests {
         let refused = read(folder.path(), "a.png", "").unwrap_err().to_string();
         assert!(refused.contains("range = [0.0, 0.003921"), "{refused}");
         assert!(read(folder.path(), "a.png", "range = [0.0, 0.0039215689]").is_ok());
-        let as_metallic = toml::from_str::<AdaptedFile>("files = [\"a.png\"]\nencoding = \"linear\"").unwrap();
-        assert!(as_metallic.read(folder.path(), "s", Map::Metallic, None).is_ok());
+        let said = read_map(folder.path(), "a.png", "", Map::Metallic).unwrap().unwrap().remarks;
+        assert!(
+            matches!(&said[..], [(RemarkKind::NearlyZero, text)] if text.contains("range = [0.0, 0.003921")),
+            "{said:?}"
+        );
         // Twins: black, and a dark picture.
-        for largest in [0, 4] {
+        for (largest, said) in [(0, vec![RemarkKind::Black]), (4, vec![])] {
             write(largest);
-            assert!(read(folder.path(), "a.png", "").is_ok(), "{largest}");
+            assert_eq!(remarks(folder.path(), Map::BaseColor), said, "{largest}");
+            assert_eq!(remarks(folder.path(), Map::Metallic), []);
         }
+    }
+
+    /// As NumPy writes 0 and 1, and as floats that a method divided once too often.
+    #[test]
+    fn zeros_and_ones_as_bytes_and_tiny_floats_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (4, 4), }";
+        let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+        let bits = (0..16).map(|at| u8::from(at % 3 == 0));
+        let file: Vec<u8> =
+            b"\x93NUMPY\x01\x00".iter().chain(&length).chain(header.as_bytes()).copied().chain(bits).collect();
+        std::fs::write(folder.path().join("a.npy"), file).unwrap();
+        let read = |file: &str, map: Map| read_map(folder.path(), file, "", map);
+        assert!(read("a.npy", Map::Roughness).unwrap_err().to_string().contains("range = [0.0, 0.003921"));
+        assert_eq!(read("a.npy", Map::Metallic).unwrap().unwrap().remarks[0].0, RemarkKind::NearlyZero);
+        for (largest, hint) in [(1e-30, "range = [0.0, 1e-30]"), (9e-5, "range = [0.0, 9e-5]")] {
+            let picture = Picture::from_fn(4, 4, |x, _| LinearRgb([largest * x as f32 / 3.0; 3]));
+            write_linear(&folder.path().join("a.exr"), &picture, Precision::Float).unwrap();
+            assert!(read("a.exr", Map::BaseColor).unwrap_err().to_string().contains(hint));
+            assert!(read_map(folder.path(), "a.exr", "scale = \"free\"", Map::BaseColor).is_ok());
+        }
+    }
+
+    #[test]
+    fn transparent_pixels_are_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |alpha: u8| {
+            let pixel = |x, _| image::Rgba([90, 120, 60, if x == 0 { alpha } else { 255 }]);
+            image::ImageBuffer::from_fn(8, 4, pixel).save(folder.path().join("a.png")).unwrap();
+        };
+        write(0);
+        assert_eq!(remarks(folder.path(), Map::BaseColor), [RemarkKind::Transparent]);
+        write(255);
+        assert_eq!(remarks(folder.path(), Map::BaseColor), []);
+    }
+
+    /// A JPEG whose EXIF data states orientation 6, as telephones write it.
+    #[test]
+    fn a_turned_picture_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut jpeg = Vec::new();
+        let encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
+        image::ImageEncoder::write_image(encoder, &[90; 16 * 8 * 3], 16, 8, image::ExtendedColorType::Rgb8).unwrap();
+        std::fs::write(folder.path().join("a.jpg"), &jpeg).unwrap();
+        assert!(read(folder.path(), "a.jpg", "").is_ok());
+        let tiff = [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0".as_slice(), &[0; 4]].concat();
+        let length = u16::try_from(2 + 6 + tiff.len()).unwrap().to_be_bytes();
+        jpeg.splice(2..2, [&[0xff, 0xe1][..], &length, b"Exif\0\0", &tiff].concat());
+        std::fs::write(folder.path().join("a.jpg"), &jpeg).unwrap();
+        assert!(read(folder.path(), "a.jpg", "").unwrap_err().to_string().contains("EXIF"));
     }
 
     #[test]
@@ -546,6 +681,19 @@ mod tests {
         assert!(refused.contains("255") && refused.contains("range = [0.0, 0.00389"), "{refused}");
         let bright = read(folder.path(), "a.png", "range = [0.0, 0.003891051]").unwrap().unwrap().get(15, 15).0[0];
         assert!((bright - 1.0).abs() < 1e-4, "{bright}");
+        // Of 10 and of 12 bits; a metallic of any size but the full one may be meant.
+        for (factor, hint) in [
+            (4, "10 bits do; expected 65535 for 1; scale them up, or write range = [0.0, 0.0156"),
+            (16, "range = [0.0, 0.06248"),
+        ] {
+            write(factor);
+            let refused = read(folder.path(), "a.png", "").unwrap_err().to_string();
+            assert!(refused.contains(hint), "{refused}");
+            assert!(read_map(folder.path(), "a.png", "", Map::Metallic).is_ok());
+        }
+        let full = image::ImageBuffer::from_fn(4, 1, |x, _| image::Luma([[0_u16, 70, 4095, 12][x as usize]]));
+        full.save(folder.path().join("a.png")).unwrap();
+        assert!(read_map(folder.path(), "a.png", "", Map::Metallic).is_err());
         // Twin: integers of the whole range.
         write(257);
         assert!(read(folder.path(), "a.png", "").is_ok());

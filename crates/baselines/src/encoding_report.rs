@@ -185,7 +185,7 @@ pub fn report(
                     unstated.insert(map.stem());
                 }
                 Ok(_) => {
-                    let Some(stored) = file.stored(folder, scene.id.as_str(), None)? else { continue };
+                    let Some(stored) = file.stored(folder, scene.id.as_str(), map, None)? else { continue };
                     let view = InputView::read(dataset, scene, map)?;
                     let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
                     let picture = ScenePicture { map, channel, stored: stored.numbers, view, most };

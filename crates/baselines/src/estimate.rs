@@ -174,6 +174,13 @@ impl Placement {
         }
     }
 
+    /// Whether a picture is stretched although the placement does not say so: by more than rounding a side to a whole
+    /// number explains. Both sizes are width and height in pixels.
+    pub(crate) fn stretches_silently(self, picture: (usize, usize), view: (usize, usize)) -> bool {
+        let [wide, high] = [picture.0 * view.1, picture.1 * view.0];
+        self == Self::Whole && wide.abs_diff(high) >= view.0.max(view.1)
+    }
+
     /// The part of a view of the size `view` that a picture of the size `picture` shows, both as width and height in
     /// pixels. Absent if the placement does not allow the picture's proportions.
     pub fn region(self, picture: (usize, usize), view: (usize, usize)) -> Option<Region> {
@@ -225,6 +232,19 @@ mod tests {
         }
         for picture in [(960, 512), (640, 480), (512, 512)] {
             assert!(!taken(Placement::Whole, picture) && taken(Placement::Stretched, picture), "{picture:?}");
+        }
+    }
+
+    #[test]
+    fn only_what_rounding_does_not_explain_is_stretched_silently() {
+        let stretched = |placement: Placement, picture| placement.stretches_silently(picture, (480, 270));
+        for picture in [(480, 272), (480, 264), (1280, 704), (476, 266)] {
+            assert!(stretched(Placement::Whole, picture), "{picture:?}");
+            assert!(!stretched(Placement::Stretched, picture) && !stretched(Placement::CentreCrop, picture));
+        }
+        // 768 columns and 432 rows are exact; 500 and 281 are the nearest to the proportions.
+        for picture in [(480, 270), (960, 540), (768, 432), (500, 281)] {
+            assert!(!stretched(Placement::Whole, picture), "{picture:?}");
         }
     }
 

@@ -11,8 +11,9 @@ use mateval_dataset::submission::Map;
 use mateval_dataset::submission::StoredEncoding;
 use mateval_image::LinearRgb;
 use mateval_image::exr_io::{read_linear, read_scalar};
+use rayon::prelude::*;
 
-use crate::adapter::Adapter;
+use crate::adapter::{Adapter, RemarkKind};
 use crate::delight::{CandidateLights, DelightOptions, delight};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Placement};
@@ -82,6 +83,36 @@ impl EstimateSource {
                 format!("'{}': {inventory}; not read: '{named}'{more}", folder.display())
             }
         })
+    }
+
+    /// Reads the pictures of a method for all scenes, so that one that cannot be used is reported before long work.
+    /// Returns what may be wrong with pictures that can be read, one sentence for each kind; empty for other estimates.
+    pub fn remarks(&self, dataset: &Dataset) -> Result<Vec<String>, BaselineError> {
+        let Self::Files { folder, adapter } = self else { return Ok(Vec::new()) };
+        let of_scene = |scene: &SceneFile| -> Result<Vec<(RemarkKind, String)>, BaselineError> {
+            let (estimate, mut remarks) = adapter.read_and_remark(folder, scene.id.as_str())?;
+            let intrinsics = input_view(&dataset.folder(&scene.id), scene)?.camera.intrinsics;
+            let view = (intrinsics.width as usize, intrinsics.height as usize);
+            estimate.region(scene.id.as_str(), view)?;
+            let stretched = estimate.size().filter(|size| adapter.placement.stretches_silently(*size, view));
+            remarks.extend(stretched.map(|(width, height)| {
+                (RemarkKind::Stretched, format!("{width}x{height} to {}x{} pixels", view.0, view.1))
+            }));
+            Ok(remarks.into_iter().map(|(kind, what)| (kind, format!("scene '{}', {what}", scene.id))).collect())
+        };
+        let of_scenes: Vec<_> = dataset.scenes.par_iter().map(of_scene).collect::<Result<_, _>>()?;
+        let mut by_kind: BTreeMap<RemarkKind, Vec<String>> = BTreeMap::new();
+        for (kind, example) in of_scenes.into_iter().flatten() {
+            by_kind.entry(kind).or_default().push(example);
+        }
+        let line = |(kind, examples): (RemarkKind, Vec<String>)| {
+            let more = match examples.len() - 1 {
+                0 => String::new(),
+                more => format!(" (and {more} more)"),
+            };
+            format!("{}: {}{more}", kind.text(), examples[0])
+        };
+        Ok(by_kind.into_iter().map(line).collect())
     }
 
     /// The encodings that the adapter of a method's pictures assumes, because its authors do not state them.

@@ -88,13 +88,9 @@ impl Places {
         open_dataset(&self.dataset)
     }
 
-    /// Opens the dataset, and says which of the estimate's files are read for it.
+    /// Opens the dataset, and says which of the estimate's files are read for it, and what may be wrong with them.
     pub fn open_for(&self, source: &EstimateSource) -> anyhow::Result<Dataset> {
-        let dataset = self.open()?;
-        if let Some(text) = source.files_read(&dataset) {
-            say(&text);
-        }
-        Ok(dataset)
+        open_for(&self.dataset, source)
     }
 
     /// Prints where the submission is and how many instances it covers.
@@ -108,6 +104,20 @@ impl ExportPlaces {
     pub fn open(&self) -> anyhow::Result<Dataset> {
         open_dataset(&self.dataset)
     }
+
+    /// Opens the dataset, and says which of the estimate's files are read for it, and what may be wrong with them.
+    pub fn open_for(&self, source: &EstimateSource) -> anyhow::Result<Dataset> {
+        open_for(&self.dataset, source)
+    }
+}
+
+fn open_for(dataset: &Path, source: &EstimateSource) -> anyhow::Result<Dataset> {
+    let dataset = open_dataset(dataset)?;
+    if let Some(text) = source.files_read(&dataset) {
+        say(&text);
+    }
+    source.remarks(&dataset)?.iter().for_each(|text| say(&format!("warning: {text}")));
+    Ok(dataset)
 }
 
 /// An estimate and the format of its files.

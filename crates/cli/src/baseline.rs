@@ -254,7 +254,7 @@ impl ProceduralArgs {
             detail: self.detail,
             graphs: self.graphs.clone(),
         };
-        let (places, dataset) = (&self.places, self.places.open()?);
+        let (places, dataset) = (&self.places, self.places.open_for(&source)?);
         let instances = with_progress(|progress| {
             procedural::write(&dataset, &places.out, places.force, &source, &options, progress)
         })?;
@@ -284,7 +284,7 @@ pub struct TexgenImportArgs {
 impl TexgenExportArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let source = self.estimate.source(EstimateSource::Truth)?;
-        let dataset = self.places.open()?;
+        let dataset = self.places.open_for(&source)?;
         let count = with_progress(|progress| bridges::export_texgen(&dataset, &self.places.out, &source, progress))?;
         print(&format!("{}: {count} objects\n", self.places.out.display()))?;
         Ok(Outcome::Good)
@@ -298,7 +298,7 @@ impl TexgenImportArgs {
             bail!("texgen-import needs --estimate, the same as texgen-export had: seen texels are taken from it");
         }
         let (places, source) = (&self.places, self.estimate.source(EstimateSource::Truth)?);
-        let dataset = places.open()?;
+        let dataset = places.open_for(&source)?;
         let (instances, textured) = with_progress(|progress| {
             bridges::import_texgen(&dataset, &self.results, &places.out, places.force, &source, progress)
         })?;

@@ -186,8 +186,28 @@ fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ObjError> {
             let what = format!("expected text of an OBJ or MTL file{}", hint(bytes));
             Err(ObjError { line: None, fault: ObjFault::Invalid(what) })
         }
-        _ => Ok(with_line_ends(String::from_utf8_lossy(without_mark(bytes)))),
+        _ => {
+            let text = with_line_ends(String::from_utf8_lossy(without_mark(bytes)));
+            match decimal_comma(&text) {
+                None => Ok(text),
+                Some((line, word)) => {
+                    let what = format!("expected numbers with a point, found '{}' with a comma", shortened(word));
+                    Err(ObjError { line: Some(line), fault: ObjFault::Invalid(what) })
+                }
+            }
+        }
     }
+}
+
+/// The first number that is written with a decimal comma, as programs do under some locales, and its line from 1.
+fn decimal_comma(text: &str) -> Option<(usize, &str)> {
+    const NUMBERS: [&str; 10] = ["v", "vt", "vn", "Kd", "Ks", "Ke", "Pr", "Pm", "Ns", "d"];
+    let is_number = |word: &&str| word.contains(',') && word.replacen(',', ".", 1).parse::<f64>().is_ok();
+    text.lines().enumerate().filter(|(_, line)| line.contains(',')).find_map(|(index, line)| {
+        let mut words = line.split_whitespace();
+        let has_numbers = NUMBERS.contains(&words.next()?);
+        Some((index + 1, words.find(|word| has_numbers && is_number(word))?))
+    })
 }
 
 /// The text with LF for every CR that ends a line alone, as old Mac OS writes them: `str::lines` and tobj would read
@@ -437,6 +457,15 @@ mod tests {
 
     fn read_text(faces: &str) -> Result<ObjMesh, ObjError> {
         read(format!("{CORNERS}{faces}").as_bytes(), LIMITS, Materials::Ignored)
+    }
+
+    #[test]
+    fn decimal_commas_are_named() {
+        let refused = |text: &str| read(text.as_bytes(), LIMITS, Materials::Ignored).unwrap_err().to_string();
+        let said = refused("# a, b\nv 0 0 0\nv 1,5 0 0\n");
+        assert_eq!(said, "line 3: expected numbers with a point, found '1,5' with a comma");
+        let materials = read_materials(b"newmtl a, 1,5\nKd 0,5 0,2 0,1\n").unwrap_err().to_string();
+        assert!(materials.starts_with("line 2: ") && materials.contains("'0,5'"), "{materials}");
     }
 
     #[test]

@@ -72,6 +72,13 @@ impl SourceFolder {
             let message = format!("expected a file name, found '{}'", shortened(name));
             return Err(FileFault { code: "bad_value", message });
         }
+        if forward.contains("://") {
+            let message = format!(
+                "'{}' is an address, which is not followed: put the file into the scene's folder and name it by its path there",
+                shortened(name)
+            );
+            return Err(FileFault { code: "path_escapes", message });
+        }
         let drive = forward.as_bytes().get(1) == Some(&b':');
         if forward.starts_with('/') || drive {
             return Err(escapes());
@@ -230,6 +237,8 @@ mod tests {
         for (name, relative) in [("models\\a b.obj", "models/a b.obj"), ("./a/../b.png", "b.png"), ("a..b", "a..b")] {
             assert_eq!(SourceFolder::relative(name).unwrap(), relative);
         }
+        let address = SourceFolder::relative("https://example.org/a.png").unwrap_err();
+        assert!(address.code == "path_escapes" && address.message.contains("is an address"), "{address}");
         for bad in ["../a", "a/../../b", "/etc/passwd", "C:\\a", "", "..", ".", "a/.."] {
             assert!(SourceFolder::relative(bad).is_err(), "{bad}");
         }

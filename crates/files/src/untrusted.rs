@@ -33,8 +33,9 @@ pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
 /// The byte order mark that some editors put before UTF-8.
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Kinds of files that are found in place of others, by their first bytes. The first that matches counts.
-const KINDS: [(&[u8], &str); 25] = [
+/// Kinds of files that are found in place of others, by their first bytes: a name, and behind a semicolon what to do. The
+/// first that matches counts.
+const KINDS: [(&[u8], &str); 44] = [
     (b"version https://git-lfs.", "a Git LFS pointer in place of the file; run `git lfs pull` where it was cloned"),
     (b"\xff\xfe\0\0", "UTF-32 text; save it as UTF-8"),
     (b"\0\0\xfe\xff", "UTF-32 text; save it as UTF-8"),
@@ -56,21 +57,50 @@ const KINDS: [(&[u8], &str); 25] = [
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"\x76\x2f\x31\x01", "an OpenEXR picture"),
-    (b"\xabKTX 20\xbb", "a KTX2 texture; convert it with `gltf-transform ktxdecompress`"),
-    (b"DDS ", "a DDS texture; convert it to PNG"),
+    (b"#?RADIANCE", "a Radiance HDR picture"),
+    (b"#?RGBE", "a Radiance HDR picture"),
+    (b"GIF8", "a GIF picture; convert it to PNG"),
+    (b"qoif", "a QOI picture; convert it to PNG"),
+    (b"8BPS", "a Photoshop file; export it as PNG, or as OpenEXR if its numbers are floats"),
+    (b"gimp xcf", "a GIMP file; export it as PNG, or as OpenEXR if its numbers are floats"),
+    // Many raw formats of cameras, such as DNG, NEF and ARW, are TIFF.
+    (b"II*\0", TIFF),
+    (b"MM\0*", TIFF),
+    (b"II+\0", TIFF),
+    (b"MM\0+", TIFF),
+    (b"\0\0\0\x0cjP  \r\n", "a JPEG 2000 picture; convert it to PNG"),
+    (b"\xff\x4f\xff\x51", "a JPEG 2000 picture; convert it to PNG"),
+    (b"\0\0\0\x0cJXL \r\n", JPEG_XL),
+    (b"\xff\x0a", JPEG_XL),
+    (b"\xabKTX 20\xbb", "a KTX2 texture; convert it with `gltf-transform ktxdecompress`, or to PNG"),
+    (b"\xabKTX 11\xbb", "a KTX texture; convert it to PNG, or to OpenEXR if its numbers are floats"),
+    (b"sB\x13\0", "a Basis Universal texture; convert it to PNG"),
+    (b"\x13\xab\xa1\x5c", "an ASTC texture; convert it to PNG"),
+    (b"DDS ", "a DDS texture; convert it to PNG, or to OpenEXR if its numbers are floats"),
+    (b"\0\0\x02\0\0\0\0\0\0\0\0\0", TARGA),
+    (b"\0\0\n\0\0\0\0\0\0\0\0\0", TARGA),
     (b"\x93NUMPY", "a NumPy array"),
     (b"%PDF", "a PDF"),
 ];
 
+const TIFF: &str =
+    "a TIFF picture (or a camera's raw file); convert it to PNG, or to OpenEXR if its numbers are floats";
+const JPEG_XL: &str = "a JPEG XL picture; convert it to PNG, or to OpenEXR if its numbers are floats";
+const TARGA: &str = "a Targa picture; convert it to PNG";
+
 /// Kinds that begin with a length, by what follows it (ISO/IEC 14496-12).
-const KINDS_BEHIND_LENGTH: [(&[u8], &str); 7] = [
+const KINDS_BEHIND_LENGTH: [(&[u8], &str); 11] = [
     (b"ftypavif", "an AVIF picture; save it as PNG or JPEG"),
     (b"ftypavis", "an AVIF picture; save it as PNG or JPEG"),
     (b"ftypheic", HEIC),
     (b"ftypheix", HEIC),
     (b"ftypheim", HEIC),
+    (b"ftypheis", HEIC),
+    (b"ftyphevc", HEIC),
+    (b"ftyphevx", HEIC),
     (b"ftypmif1", HEIC),
     (b"ftypmsf1", HEIC),
+    (b"ftypcrx ", "a camera's raw file; develop it, and save it as PNG"),
 ];
 const HEIC: &str = "a HEIC picture, as telephones write it; save it as PNG or JPEG";
 
@@ -90,9 +120,20 @@ pub fn mistaken_for(bytes: &[u8]) -> Option<&'static str> {
     let known = known.or_else(|| {
         is_web_page(bytes).then_some("a web page in place of the file; a download probably asked to sign in")
     });
+    let known = known.or_else(|| match bytes {
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("a WebP picture"),
+        // The four bytes behind the length are reserved; text has no zeros.
+        [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some("a BMP picture"),
+        _ => None,
+    });
     // ASCII characters as UTF-16 without a mark: every second byte is 0.
     let is_utf16 = || bytes.len() >= 4 && (bytes[..2].contains(&0) && bytes[2..4].contains(&0) && bytes[..4] != [0; 4]);
     known.or_else(|| is_utf16().then_some("UTF-16 text; save it as UTF-8"))
+}
+
+/// The name of a kind that is often mistaken for another, without what to do: `a DDS texture`.
+pub fn kind_name(bytes: &[u8]) -> Option<&'static str> {
+    mistaken_for(bytes).map(|kind| kind.split_once(';').map_or(kind, |(name, _)| name))
 }
 
 fn is_web_page(bytes: &[u8]) -> bool {
@@ -278,6 +319,19 @@ mod tests {
             (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "HEIC"),
             (b"\0\0\0\x18ftypmif1", "HEIC"),
             (b"\0\0\0\x1cftypavif", "AVIF"),
+            (b"II*\0\x08\0\0\0", "TIFF"),
+            (b"MM\0*\0\0\0\x08", "TIFF"),
+            (b"II+\0\x08\0\0\0", "TIFF"),
+            (b"8BPS\0\x01", "Photoshop"),
+            (b"RIFF\x24\0\0\0WEBPVP8L", "WebP"),
+            (b"BM\x46\0\0\0\0\0\0\0\x36\0", "BMP"),
+            (b"\xff\x0a\x7a\x1f", "JPEG XL"),
+            (b"\0\0\0\x0cJXL \r\n\x87\n", "JPEG XL"),
+            (b"\0\0\0\x0cjP  \r\n\x87\n", "JPEG 2000"),
+            (b"\xabKTX 20\xbb\r\n\x1a\n", "KTX2"),
+            (b"\xabKTX 11\xbb\r\n\x1a\n", "KTX texture"),
+            (b"DDS |\0\0\0", "DDS"),
+            (b"\0\0\x0a\0\0\0\0\0\0\0\0\0\x40\0", "Targa"),
         ] {
             assert!(mistaken_for(bytes).is_some_and(|kind| kind.contains(word)), "{word}");
         }
@@ -287,6 +341,7 @@ mod tests {
         {
             assert_eq!(mistaken_for(bytes), None);
         }
+        assert_eq!(kind_name(b"DDS |"), Some("a DDS texture"));
         assert_eq!((without_mark(b"\xef\xbb\xbf{}"), without_mark(b"{}")), (b"{}".as_slice(), b"{}".as_slice()));
     }
 

@@ -1,14 +1,10 @@
 //! Reads photos from untrusted PNG, JPEG, WebP, BMP, Radiance HDR and OpenEXR files.
 
-use std::io::Cursor;
 use std::path::Path;
-
-use image::metadata::Orientation;
-use image::{ImageDecoder as _, ImageReader};
 
 use crate::color_profile::{Profile, REC709};
 use crate::npy_io::NPY_SIGNATURE;
-use crate::texture_io::{Encoding, texture_and_alpha_of_bytes};
+use crate::texture_io::{Encoding, FewerBits, is_turned, texture_and_alpha_of_bytes, transparent_share};
 use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
 
 /// A photo in linear light; alpha is dropped.
@@ -16,6 +12,7 @@ use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
 pub struct PhotoFile {
     pixels: Texture,
     encoding: Encoding,
+    transparent: f64,
 }
 
 impl PhotoFile {
@@ -36,9 +33,18 @@ impl PhotoFile {
             return Err(ImageError::Unsupported { path: path.to_owned(), what });
         }
         let profile = Profile::of(path, &bytes)?;
-        let (pixels, _) = texture_and_alpha_of_bytes(path, bytes, Encoding::Srgb, Wrap::Clamp)?;
+        let (pixels, alpha) = texture_and_alpha_of_bytes(path, bytes, Encoding::Srgb, Wrap::Clamp)?;
+        if let Some(words) = FewerBits::of(&pixels) {
+            let FewerBits { bits, largest } = words;
+            return Err(invalid(format!(
+                "its 16-bit integers reach only {largest} of 65535, as those of {bits} bits do; expected 65535 for white; \
+                 multiply them by 65535 / {}",
+                words.full()
+            )));
+        }
+        let transparent = alpha.map_or(0.0, |alpha| transparent_share(&alpha));
         if let Some(pixels) = profile.and_then(|profile| converted(&pixels, &profile)).transpose()? {
-            return Ok(Self { pixels, encoding: Encoding::Srgb });
+            return Ok(Self { pixels, encoding: Encoding::Srgb, transparent });
         }
         let mut encoding = Encoding::Srgb;
         if let Texels::Linear(values) = pixels.texels() {
@@ -49,12 +55,17 @@ impl PhotoFile {
                 return Err(invalid(what));
             }
         }
-        Ok(Self { pixels, encoding })
+        Ok(Self { pixels, encoding, transparent })
     }
 
     /// How the file states its values: integers are sRGB or by a colour profile, floating-point numbers are linear.
     pub fn encoding(&self) -> Encoding {
         self.encoding
+    }
+
+    /// The share of pixels whose alpha is below 1; their colours are used as they are stored.
+    pub fn transparent_share(&self) -> f64 {
+        self.transparent
     }
 
     pub fn width(&self) -> usize {
@@ -140,14 +151,6 @@ fn covered(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     (0..to).map(of).collect()
 }
 
-/// Whether the file states that viewers should turn or mirror it. False for a file without such data.
-fn is_turned(bytes: &[u8]) -> bool {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let decoder = reader.ok().and_then(|reader| reader.into_decoder().ok());
-    let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
-    orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,6 +229,34 @@ mod tests {
         let LinearRgb(found) = photo.resized(1, 1).get(0, 0);
         assert_eq!(photo.encoding(), Encoding::Srgb);
         assert!((found[0] - 0.5029).abs() < 1e-3 && found[1..] == [0.0, 1.0], "{found:?}");
+    }
+
+    #[test]
+    fn integers_of_fewer_bits_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let write = |largest: u16| {
+            png_io::write_rgb_words(&path, &Picture::from_fn(8, 2, |x, _| [largest / 8 * (x as u16 + 1), 3, 5]))
+                .unwrap();
+            read(&path)
+        };
+        for (largest, bits) in [(1016, "10 bits"), (4088, "12 bits"), (248, "8 bits")] {
+            let refused = write(largest).unwrap_err().to_string();
+            assert!(refused.contains(bits) && refused.contains("65535 / "), "{refused}");
+        }
+        // Twins: integers of the whole range, and a dark photo.
+        assert!(write(65528).is_ok() && write(6000).is_ok());
+    }
+
+    #[test]
+    fn transparent_pixels_are_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        png_io::write_rgba_bytes(&path, &Picture::from_fn(4, 1, |x, _| [90, 90, 90, if x == 0 { 254 } else { 255 }]))
+            .unwrap();
+        assert_eq!(read(&path).unwrap().transparent_share(), 0.25);
+        png_io::write_rgb_bytes(&path, &Picture::filled(2, 2, [90; 3])).unwrap();
+        assert_eq!(read(&path).unwrap().transparent_share(), 0.0);
     }
 
     #[test]

@@ -2,8 +2,10 @@
 //! submission's maps.
 
 use std::io::Cursor;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
+use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 
 use crate::exr_io::{self, channels_of_bytes, scalar_of_bytes};
@@ -66,11 +68,78 @@ fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Textu
     texture_and_alpha_of_bytes(path, read_file(path)?, encoding, wrap)
 }
 
+/// Whether the file states that viewers should turn or mirror it. False for a file without such data.
+pub fn is_turned(bytes: &[u8]) -> bool {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let decoder = reader.ok().and_then(|reader| reader.into_decoder().ok());
+    let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
+    orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
+}
+
+/// The share of texels of an alpha channel that are below 1.
+pub fn transparent_share(alpha: &Texture) -> f64 {
+    let below = alpha.linear_texels().filter(|value| value[0] < 1.0).count();
+    below as f64 / (alpha.width() * alpha.height()) as f64
+}
+
+/// What the largest of 16-bit integers of 8, 10 and 12 bits is; of 14 bits only the last is certain enough, since smaller
+/// ones are those of a dark picture.
+const LARGEST_OF_BITS: [(u32, RangeInclusive<u16>); 4] =
+    [(8, 128..=255), (10, 512..=1023), (12, 2048..=4095), (14, 16383..=16383)];
+
+/// 16-bit integers that reach only the largest number of fewer bits, such as 4095 of 12: they were not scaled up when
+/// they were saved, and are read as nearly black.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FewerBits {
+    pub bits: u32,
+    pub largest: u16,
+}
+
+impl FewerBits {
+    /// The bits of a picture's 16-bit integers, where they are fewer than 16. None for other numbers.
+    pub fn of(picture: &Texture) -> Option<Self> {
+        let largest = match picture.texels() {
+            Texels::Srgb16(words) => words.iter().flatten().copied().max()?,
+            Texels::Linear(values) => largest_word(values.as_flattened())?,
+            Texels::Grey(values) => largest_word(values)?,
+            Texels::Srgb8(_) | Texels::Linear8(_) | Texels::Grey8(_) => return None,
+        };
+        Self::of_largest(largest)
+    }
+
+    /// The same of the largest of several pictures' 16-bit integers.
+    pub fn of_largest(largest: u16) -> Option<Self> {
+        let (bits, _) = LARGEST_OF_BITS.into_iter().find(|(_, range)| range.contains(&largest))?;
+        Some(Self { bits, largest })
+    }
+
+    /// The largest number of these bits.
+    pub fn full(self) -> u16 {
+        ((1_u32 << self.bits) - 1) as u16
+    }
+}
+
+/// The largest of 16-bit integers that were divided by 65535; none where the numbers are no such integers, or are those
+/// of bytes, which are multiples of 257.
+fn largest_word(values: &[f32]) -> Option<u16> {
+    let (mut largest, mut are_bytes) = (0, true);
+    for value in values.iter().map(|value| value * 65535.0) {
+        let whole = value.round();
+        // The division and the product round to 32 bits.
+        if !((value - whole).abs() <= 2.0 * f32::EPSILON * whole + 1e-4 && (0.0..=65535.0).contains(&whole)) {
+            return None;
+        }
+        largest = largest.max(whole as u16);
+        are_bytes &= (whole as u16).is_multiple_of(257);
+    }
+    (!are_bytes).then_some(largest)
+}
+
 fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
     let invalid = |error: image::ImageError| ImageError::invalid(path, format!("not a valid picture: {error}"));
     let hint = hint(&bytes);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(FileError::io("read", path))?;
-    if reader.format().is_none() {
+    if !reader.format().is_some_and(|format| format.reading_enabled()) {
         let what =
             format!("not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy{hint}");
         return Err(ImageError::unsupported(path, what));
@@ -202,10 +271,34 @@ mod tests {
             (b"version https://git-lfs.github.com/spec/v1\n".as_slice(), "git lfs pull"),
             (b"<!doctype html><html>", "web page"),
             (b"\0\0\0\x18ftypheic\0\0\0\0", "HEIC"),
+            // Kinds that the decoder knows and does not read.
+            (b"II*\0\x08\0\0\0\0\0", "a TIFF picture (or a camera's raw file); convert it to PNG"),
+            (b"DDS |\0\0\0\x07\x10", "a DDS texture; convert it to PNG"),
+            (b"GIF89a\x01\0\x01\0", "GIF"),
+            (b"\0\0\0\x1cftypavif\0\0\0\0", "AVIF"),
+            (b"\xff\x0a\x7a\x1f", "JPEG XL"),
+            (b"\xabKTX 20\xbb\r\n\x1a\n", "KTX2"),
+            (b"8BPS\0\x01\0\0", "Photoshop"),
         ] {
             let error = refused(bytes);
             assert!(error.contains("not a known picture format") && error.contains(word), "{error}");
         }
+    }
+
+    #[test]
+    fn integers_of_fewer_bits_are_found() {
+        let of = |texels: Texels| FewerBits::of(&Texture::new(2, 1, texels, Wrap::Clamp).unwrap());
+        let linear = |words: [u16; 2]| of(Texels::Grey(words.map(|word| f32::from(word) / 65535.0).to_vec()));
+        for (largest, bits) in [(200, 8), (1023, 10), (4095, 12), (3000, 12), (16383, 14)] {
+            let found = Some(FewerBits { bits, largest });
+            assert_eq!((linear([7, largest]), of(Texels::Srgb16(vec![[0; 3], [largest; 3]]))), (found, found));
+        }
+        // Twins: other integers, bytes of up to 15 of 255, which is 3855 of 65535, and floats.
+        for words in [[7, 65535], [7, 5000], [0, 0], [257, 3855]] {
+            assert_eq!(linear(words), None);
+        }
+        assert_eq!(of(Texels::Grey8(vec![1, 15])), None);
+        assert_eq!(of(Texels::Grey(vec![0.01234, 0.06])), None);
     }
 
     /// Other programs write scalars as one channel.

@@ -50,6 +50,11 @@ fn of_mitsuba() -> Vec<Fallback<&'static str>> {
             "unknown_parameter",
         ),
         fallback(
+            "the texture's colour as it is, of another range",
+            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='bytes.exr'/></texture></bsdf></shape>",
+            "out_of_range",
+        ),
+        fallback(
             "the colour of the first of two",
             "<shape type='cube'><bsdf type='blendbsdf'><bsdf type='diffuse'/><bsdf type='plastic'/></bsdf></shape>",
             "unsupported",
@@ -195,6 +200,15 @@ fn what_multiplies_or_exceeds_a_base_colour_of_gltf_unstates_it() {
 /// Of the reader of glTF: a changed file.
 fn of_gltf() -> Vec<Fallback<Value>> {
     let material = |key: &str, value: Value| with("/materials/0", json!({ "pbrMetallicRoughness": {}, key: value }));
+    let camera_of = |aspect: Value, yfov: f64| {
+        let mut file = with("/nodes/0/camera", json!(0));
+        file["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": yfov, "znear": 0.1 } }]);
+        if !aspect.is_null() {
+            file["cameras"][0]["perspective"]["aspectRatio"] = aspect;
+        }
+        file
+    };
+    let camera = |aspect: Value| camera_of(aspect, 1.0);
     let textured = |texture: Value| {
         let mut file = with("/materials/0/pbrMetallicRoughness/baseColorTexture", json!({ "index": 0 }));
         (file["textures"], file["images"]) = (json!([texture]), json!([{ "uri": "none.png" }]));
@@ -220,6 +234,9 @@ fn of_gltf() -> Vec<Fallback<Value>> {
             "not_represented",
         ),
         fallback("radiance 1 from outside", with("/asset/generator", json!("x")), "no_light"),
+        fallback("16 to 9, or the recipe's resolution, for a picture", camera(json!(null)), "no_aspect_ratio"),
+        fallback("no camera of a field of view in degrees", camera_of(json!(1.5), 55.0), "bad_value"),
+        fallback("the same for width over height of 0", camera(json!(0)), "no_aspect_ratio"),
         fallback(
             "a clamped factor",
             material("pbrMetallicRoughness", json!({ "baseColorFactor": [200, 100, 50, 1] })),

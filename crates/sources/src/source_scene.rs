@@ -9,7 +9,8 @@ use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, SourceFolder};
-use mateval_image::ImageError;
+use mateval_image::texture_io::FewerBits;
+use mateval_image::{ImageError, Texels, Texture};
 
 use crate::log::Log;
 
@@ -79,6 +80,8 @@ pub struct FileScene {
     /// The first camera that can be used; a Mitsuba scene always has one. glTF states no picture size: it has 480
     /// columns.
     pub camera: Option<Camera>,
+    /// Width over height that a glTF's camera states, where it does.
+    pub aspect: Option<f64>,
     /// What was subtracted from the file's positions, in metres.
     pub shift_m: DVec3,
     /// Everything that was left out, replaced or approximated; sorted.
@@ -149,6 +152,34 @@ pub(crate) fn picture_fault(code: &'static str, error: &ImageError) -> FileFault
     FileFault { code, message }
 }
 
+/// Beyond this, a number of a colour texture is no reflectance, and below 0 it is none either.
+const MOST_REFLECTANCE: f32 = 1.05;
+/// A texture of floats whose largest number is smaller is black by mistake.
+const LEAST_REFLECTANCE: f32 = 1e-4;
+/// A larger share of texels that are no reflectance is no noise of a filter or a codec.
+const MOST_STRAY: f64 = 0.01;
+
+/// Why a colour texture cannot be that of a material as it is: its numbers have another range. None for a sound one.
+pub(crate) fn other_range(texture: &Texture) -> Option<String> {
+    if let Some(words) = FewerBits::of(texture) {
+        let FewerBits { bits, largest } = words;
+        return Some(format!("16-bit integers that reach only {largest} of 65535, as those of {bits} bits do"));
+    }
+    let Texels::Linear(texels) = texture.texels() else { return None };
+    let numbers = || texels.iter().flatten().copied();
+    let stray = texels.iter().filter(|rgb| rgb.iter().any(|value| !(0.0..=MOST_REFLECTANCE).contains(value))).count();
+    let share = stray as f64 / texels.len().max(1) as f64;
+    let (least, largest) = (numbers().fold(f32::INFINITY, f32::min), numbers().fold(f32::NEG_INFINITY, f32::max));
+    if share > MOST_STRAY {
+        let percent = 100.0 * share;
+        return Some(format!(
+            "expected 0 to 1, found {least:?} to {largest:?}, and {percent:.0} % of the texels beyond"
+        ));
+    }
+    let is_tiny = 0.0 < largest && largest < LEAST_REFLECTANCE;
+    is_tiny.then(|| format!("expected 0 to 1, found no number above {largest:?}"))
+}
+
 /// A scene whose camera stands farther than this from the origin, in metres, is moved near to it before anything
 /// becomes f32. Scenes in map coordinates are.
 const NEAR_M: f64 = 1000.0;
@@ -178,6 +209,22 @@ pub(crate) fn shift_transform(shift: DVec3) -> DMat4 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn textures_of_another_range_are_found() {
+        let of = |texels: Texels| other_range(&Texture::new(2, 1, texels, mateval_image::Wrap::Clamp).unwrap());
+        let floats = |a: f32, b: f32| of(Texels::Linear(vec![[0.0, a, 0.0], [b; 3]]));
+        assert!(floats(0.0, 200.0).unwrap().contains("found 0.0 to 200.0, and 50 %"));
+        assert!(floats(0.5, -1.0).unwrap().contains("found -1.0 to 0.5"));
+        assert!(floats(0.0, 1e-30).unwrap().contains("1e-30"));
+        assert!(of(Texels::Srgb16(vec![[4095; 3], [9; 3]])).unwrap().contains("12 bits"));
+        // Twins: reflectances, with the ringing of a codec, and black.
+        assert_eq!(
+            [floats(0.3, 1.0), floats(0.3, 1.04), floats(0.0, 0.0), floats(0.001, 0.0)],
+            [None, None, None, None]
+        );
+        assert_eq!([of(Texels::Srgb8(vec![[1; 3]; 2])), of(Texels::Srgb16(vec![[65535; 3]; 2]))], [None, None]);
+    }
 
     #[test]
     fn only_far_scenes_are_moved_by_whole_metres() {

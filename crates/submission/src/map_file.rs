@@ -9,7 +9,7 @@ use std::path::Path;
 
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
 use mateval_dataset::{SceneError, TriangleMesh};
-use mateval_files::untrusted::shortened;
+use mateval_files::untrusted::{kind_name, shortened};
 use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
 use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
 use mateval_image::{ImageError, Texels, Texture, texture_io};
@@ -132,25 +132,9 @@ fn check_kind(path: &Path, bytes: &[u8]) -> Result<(), FileFault> {
     if bytes.starts_with(expected) || expected.starts_with(bytes) {
         return Ok(());
     }
-    let message = format!("{} in a file named .{}", kind_of(bytes), name.to_lowercase());
-    Err(FileFault::new("wrong_kind", message, "write a PNG as .png, an EXR as .exr; nothing else is read"))
-}
-
-fn kind_of(bytes: &[u8]) -> &'static str {
-    const KINDS: [(&[u8], &str); 11] = [
-        (PNG_SIGNATURE, "a PNG"),
-        (EXR_SIGNATURE, "an EXR"),
-        (b"\xff\xd8\xff", "a JPEG"),
-        (b"GIF8", "a GIF"),
-        (b"II*\0", "a TIFF"),
-        (b"MM\0*", "a TIFF"),
-        (b"RIFF", "a WebP"),
-        (b"#?", "a Radiance HDR"),
-        (b"DDS ", "a DDS"),
-        (b"\x93NUMPY", "a NumPy array"),
-        (b"BM", "a BMP"),
-    ];
-    KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map_or("not a picture", |(_, name)| name)
+    let kind = kind_name(bytes).unwrap_or("not a picture");
+    let message = format!("{kind} in a file named .{}", name.to_lowercase());
+    Err(FileFault::new("wrong_kind", message, "convert it to PNG (.png) or OpenEXR (.exr); nothing else is read"))
 }
 
 /// Fails unless the map is a square of a size that a submission may use.

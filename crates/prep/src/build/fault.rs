@@ -64,8 +64,8 @@ pub enum SceneFault {
         findings: Vec<Finding>,
     },
     #[error(
-        "none of the scene's {lights} lights reaches the input view: its picture would be black; add a light, or state a \
-         photo{}",
+        "none of the scene's {lights} lights reaches the input view, or too little of it for its exposure: its picture would \
+         be black; add a light, raise `exposure`, or state a photo{}",
         causes(findings)
     )]
     NoLight {
@@ -81,9 +81,10 @@ pub enum SceneFault {
     /// A glTF has no camera, and neither has the recipe.
     #[error(
         "the file has no perspective camera; add one, or state it in the recipe, as in \
-         `camera = {{ position = [4.0, 1.5, 3.0], target = [1.0, 0.8, 0.5], fov_y_deg = 50 }}`"
+         `camera = {{ position = [4.0, 1.5, 3.0], target = [1.0, 0.8, 0.5], fov_y_deg = 50 }}`{}",
+        causes(findings)
     )]
-    NoCameraInFile,
+    NoCameraInFile { findings: Vec<Finding> },
     #[error("the house has no room '{room}'; it has '{}'", rooms.join("', '"))]
     NoRoom { room: String, rooms: Vec<String> },
     #[error("the house has no designer's camera {number}; it has {}", listed(known))]
@@ -119,6 +120,11 @@ pub enum PhotoFault {
     /// The file is not a valid photo.
     #[error(transparent)]
     Picture(#[from] ImageError),
+    #[error(
+        "'{file}' is black: its largest number is {largest:?}, with the exposure {exposure}; expected a photo whose brightest \
+         pixels are near 1 with it; state another `exposure`, or fix the photo"
+    )]
+    Black { file: String, largest: f32, exposure: f64 },
     /// The photo shows more or less than the camera, or is smaller than its picture.
     #[error(
         "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; \

@@ -170,7 +170,7 @@ fn build_scene(
     let mut seen = write_pictures(&plan, folder, &expected, progress)?.or_refuse(&entry.id, &plan)?;
     let unstated = check_unstated(entry, &plan, &seen).map_err(PrepError::scene(&entry.id))?;
     plan.findings.extend(unstated);
-    if !is_lit(&plan)? {
+    if !is_lit(&plan, entry.exposure)? {
         let findings = above_notes(&[plan.findings.as_slice(), &seen.findings].concat());
         return Err(PrepError::scene(&entry.id)(SceneFault::NoLight { lights: plan.scene.lights.len(), findings }));
     }

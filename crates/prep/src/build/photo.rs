@@ -5,6 +5,7 @@ use std::path::Path;
 use mateval_dataset::camera::Camera;
 use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
 use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::{Finding, Severity};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
 use mateval_image::exr_io::{self, Precision};
@@ -21,12 +22,18 @@ use crate::views::write_preview;
 /// The largest file of a photo, in bytes: one of 64 million pixels of 32-bit numbers has 805 million.
 const MAX_PHOTO_BYTES: u64 = 1 << 30;
 
+/// Where the largest number times the exposure is smaller, every byte of `rgb.png` is 0 (half of 1/255, by the linear part
+/// of the curve of sRGB).
+const LEAST_SHOWN: f64 = 0.5 / 255.0 / 12.92;
+
 /// A photo at the size of the camera's picture.
 pub(super) struct ScenePhoto {
     /// What `scene.json` states of it.
     pub(super) listed: Photo,
     /// Linear radiance before exposure.
     picture: Picture<LinearRgb>,
+    /// Share of the file's pixels whose alpha is below 1.
+    transparent_share: f64,
 }
 
 /// Reads the scene's photo, if the recipe names one, and lists its file among the source's. `source` is the folder of
@@ -44,6 +51,13 @@ pub(super) fn read_photo(
     scene.files.extend(folder.into_files().hashes);
     scene.files.sort();
     scene.files.dedup();
+    if photo.transparent_share > 0.0 {
+        let message = format!("{:.1} % of its pixels have an alpha below 1", 100.0 * photo.transparent_share);
+        let action = "used their colours as they are stored";
+        let file = photo.listed.file.clone();
+        scene.findings.push(Finding::new(Severity::Warning, "transparent_photo", file, "", message, action));
+        scene.findings.sort();
+    }
     Ok(Some(photo))
 }
 
@@ -69,7 +83,12 @@ fn photo_of_file(
             (PhotoEncoding::Srgb, picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(unexposed))))
         }
     };
-    Ok(ScenePhoto { listed: Photo { file, size: found, encoding }, picture })
+    let largest = picture.pixels().iter().flat_map(|LinearRgb(rgb)| *rgb).fold(0.0, f32::max);
+    if f64::from(largest) * exposure < LEAST_SHOWN {
+        return Err(PhotoFault::Black { file, largest, exposure });
+    }
+    let transparent_share = photo.transparent_share();
+    Ok(ScenePhoto { listed: Photo { file, size: found, encoding }, picture, transparent_share })
 }
 
 /// Whether a photo is at least as large as the camera's picture and, reduced to its width, less than half a row higher
@@ -90,7 +109,35 @@ impl ScenePhoto {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+    use mateval_dataset::camera::Intrinsics;
+
     use super::*;
+
+    /// In a file of floats, whose numbers the exposure multiplies, and in one of integers, which are shown as they are.
+    #[test]
+    fn black_photos_are_refused_and_transparent_ones_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let intrinsics = Intrinsics::from_fov_y(8, 6, 1.0);
+        let camera = Camera::look_at(DVec3::ZERO, DVec3::Z, DVec3::Y, intrinsics).unwrap();
+        let read = |file: &str, exposure: f64| {
+            let mut source = SourceFolder::new(folder.path(), 1 << 20).unwrap();
+            photo_of_file(&mut source, file, &camera, exposure)
+        };
+        let tiny = Picture::from_fn(8, 6, |x, _| LinearRgb([1e-30 * x as f32 / 7.0; 3]));
+        exr_io::write_linear(&folder.path().join("a.exr"), &tiny, Precision::Float).unwrap();
+        let said = read("a.exr", 1.0).err().unwrap().to_string();
+        assert!(said.contains("'a.exr' is black: its largest number is 1e-30, with the exposure 1"), "{said}");
+        assert_eq!(read("a.exr", 1e30).ok().unwrap().transparent_share, 0.0);
+        let write = |pixel: [u8; 4]| {
+            let picture = Picture::from_fn(8, 6, |x, _| if x < 4 { pixel } else { [0, 0, 0, 255] });
+            mateval_image::png_io::write_rgba_bytes(&folder.path().join("a.png"), &picture).unwrap();
+        };
+        write([0, 0, 0, 255]);
+        assert!(matches!(read("a.png", 1e9), Err(PhotoFault::Black { .. })));
+        write([1, 0, 0, 7]);
+        assert_eq!(read("a.png", 1e-9).ok().unwrap().transparent_share, 0.5);
+    }
 
     #[test]
     fn a_photo_has_the_proportions_of_the_picture_and_at_least_its_size() {

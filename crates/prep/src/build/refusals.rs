@@ -28,6 +28,11 @@ const MOST_NAMES: usize = 5;
 const LIGHT_PIXELS: f64 = 48.0;
 /// Samples a pixel in which light is looked for: first few, then many.
 const LIGHT_SAMPLES: [u32; 2] = [4, 128];
+/// Where the brightest pixel times the exposure is smaller, every byte of the picture is 0, with a margin of ten for what the
+/// coarse picture misses.
+const LEAST_LIGHT: f64 = 1.5e-5;
+/// Most missing files that are looked for elsewhere.
+const MOST_LOOKED_FOR: usize = 8;
 /// Most folders that are searched for a missing file.
 const MOST_FOLDERS: usize = 2000;
 
@@ -42,9 +47,9 @@ pub(super) fn check_missing(
     let Some(example) = missing.files.first() else { return Ok(None) };
     let (count, wanted) = (missing.files.len(), missing.wanted.max(1));
     let share = count as f64 / wanted as f64;
-    let models = entry.front3d.as_ref().map(|room| room.models.as_path());
-    let elsewhere = folder_of(root, example, models)
-        .map_or(String::new(), |folder| format!("; '{}' holds such files: name that folder", folder.display()));
+    // The first names may be those of shapes, which have no file of their own.
+    let mut elsewhere = missing.files.iter().take(MOST_LOOKED_FOR).map(|file| elsewhere(entry, root, file));
+    let elsewhere = elsewhere.find(|found| !found.is_empty()).unwrap_or_default();
     let message = format!("{count} of {wanted} {} are missing, such as '{example}'{elsewhere}", missing.what);
     if share > MOST_MISSING && !entry.allow_missing {
         return Err(SceneFault::Missing { message, most: MOST_MISSING, findings: above_notes(findings) });
@@ -57,6 +62,48 @@ pub(super) fn check_missing(
         message,
         "made the scene without them",
     )))
+}
+
+/// Where a missing file was found instead, as a sentence's end; empty if nowhere.
+fn elsewhere(entry: &RecipeScene, root: &Path, missing: &str) -> String {
+    let models = entry.front3d.as_ref().map(|room| room.models.as_path());
+    if let Some(folder) = folder_of(root, missing, models) {
+        let shown = folder.display();
+        return match models {
+            Some(_) => format!("; '{shown}' holds such files: name that folder"),
+            None => format!("; '{shown}' holds such files: move them to where the scene names them"),
+        };
+    }
+    if let Some(found) = by_other_case(root, missing) {
+        return format!("; '{found}' exists: its name differs in upper and lower case alone, so rename it");
+    }
+    let plain = missing.replace("%20", " ");
+    if plain != missing && root.join(&plain).is_file() {
+        return format!("; '{plain}' exists: names are not percent-encoded here");
+    }
+    // A main file that was moved down, away from its files. The folder above is looked at only if it holds the very path.
+    let above = root.parent().filter(|above| models.is_none() && above.join(missing).is_file());
+    above.map_or(String::new(), |above| {
+        format!(
+            "; '{}' holds such files, but lies outside of the scene's folder: move the scene's main file there",
+            above.display()
+        )
+    })
+}
+
+/// The path of a file below `root` that differs from `missing` in upper and lower case alone.
+fn by_other_case(root: &Path, missing: &str) -> Option<String> {
+    let mut found: Vec<String> = Vec::new();
+    for part in missing.split('/').filter(|part| !matches!(*part, "" | ".")) {
+        let folder = found.iter().fold(root.to_owned(), |folder, part| folder.join(part));
+        let names = std::fs::read_dir(folder).into_iter().flatten().flatten().take(MOST_FOLDERS);
+        let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut same: Vec<String> = names.filter(|name| name.to_lowercase() == part.to_lowercase()).collect();
+        same.sort_by_key(|name| (name != part, name.clone()));
+        found.push(same.into_iter().next()?);
+    }
+    let found = found.join("/");
+    (root.join(&found).is_file() && found != missing).then_some(found)
 }
 
 /// A folder below `root`, or `root` itself, in which the missing file exists: by its whole path, or else by its own
@@ -133,8 +180,8 @@ pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> R
     )))
 }
 
-/// Whether any light reaches the input view. A photo from elsewhere has its own light.
-pub(super) fn is_lit(plan: &Plan) -> Result<bool, PrepError> {
+/// Whether enough light reaches the input view for a picture that is not black. A photo from elsewhere has its own light.
+pub(super) fn is_lit(plan: &Plan, exposure: f64) -> Result<bool, PrepError> {
     if plan.photo.is_some() {
         return Ok(true);
     }
@@ -144,7 +191,10 @@ pub(super) fn is_lit(plan: &Plan) -> Result<bool, PrepError> {
         let settings = RenderSettings { samples, ..RenderSettings::default() };
         let render = render_views(&world, &[camera], &settings, &[0], &|_, _| {})?;
         let sums = render.views[0].halves.iter().map(LightBasis::sum);
-        if sums.flat_map(|sum| sum.pixels().to_vec()).any(|pixel| pixel.0.iter().any(|value| *value > 0.0)) {
+        if sums
+            .flat_map(|sum| sum.pixels().to_vec())
+            .any(|pixel| pixel.0.iter().any(|value| exposure * f64::from(*value) >= LEAST_LIGHT))
+        {
             return Ok(true);
         }
     }
@@ -197,6 +247,21 @@ mod tests {
         // It is in the folder that the recipe names, so it is damaged.
         let named = Path::new("models/3D-FUTURE-model");
         assert_eq!(folder_of(root.path(), "chair-a/raw_model.obj", Some(named)), None);
+    }
+
+    #[test]
+    fn where_a_missing_file_lies_is_said() {
+        let root =
+            folder_with(&["scene/Textures/Wood.PNG", "scene/deep/maps/a.png", "scene/my wood.png", "meshes/chair.obj"]);
+        let entry: RecipeScene = toml::from_str("id = \"a\"\nbitterli = \"scene/scene.xml\"").unwrap();
+        let said = |missing: &str| elsewhere(&entry, &root.path().join("scene"), missing);
+        assert!(
+            said("textures/wood.png").contains("'Textures/Wood.PNG' exists: its name differs in upper and lower case")
+        );
+        assert!(said("maps/a.png").contains("deep' holds such files: move them"));
+        assert!(said("meshes/chair.obj").contains("move the scene's main file there"));
+        assert!(said("my%20wood.png").contains("'my wood.png' exists"));
+        assert_eq!(said("maps/b.png"), "");
     }
 
     #[test]

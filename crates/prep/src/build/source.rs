@@ -9,7 +9,7 @@ use mateval_dataset::dataset::View;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::ReferenceScene;
-use mateval_dataset::{Progress, Report, SourceKind, ViewId};
+use mateval_dataset::{Finding, Progress, Report, Severity, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
 use mateval_sources::front3d::camera_sampler::RoomSampler;
@@ -18,7 +18,7 @@ use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceSc
 use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
-use super::fault::{BakeFault, SceneFault};
+use super::fault::{BakeFault, SceneFault, above_notes};
 use crate::blender::bake::bake;
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
@@ -81,7 +81,7 @@ fn states(scene: &ReferenceScene, origins: &[InstanceOrigin], stated: fn(&Stated
 
 fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path) -> Result<SourceScene, PrepError> {
     let read = bitterli::read(&root.join(xml), given_place(entry), &bitterli::Limits::default())?;
-    let camera = bitterli_camera(recipe, entry, read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?;
+    let camera = bitterli_camera(recipe, entry, &read).map_err(PrepError::scene(&entry.id))?;
     let folder = xml.parent().and_then(Path::file_name);
     Ok(scene_of_file(read, SourceKind::Bitterli, folder, entry, xml, camera))
 }
@@ -116,17 +116,12 @@ fn scene_of_file(
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
-fn bitterli_camera(
-    recipe: &Recipe,
-    entry: &RecipeScene,
-    source: Option<Camera>,
-    shift_m: DVec3,
-) -> Result<Camera, SceneFault> {
-    let source = source.ok_or(SceneFault::NoCameraInFile)?;
+fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result<Camera, SceneFault> {
+    let source = read.camera.ok_or_else(|| no_camera(read))?;
     let old = source.intrinsics;
     let [width, height] = picture_size(recipe, entry, [old.width, old.height])?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
-        return given_camera(given, [width, height], shift_m);
+        return given_camera(given, [width, height], read.shift_m);
     }
     let scale = f64::from(width) / f64::from(old.width);
     let intrinsics = Intrinsics {
@@ -153,8 +148,26 @@ fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[
 /// The scene of the glTF at `path`, which the recipe names as `file`.
 fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, path: &Path, file: &Path) -> Result<SourceScene, PrepError> {
     let read = gltf::read(path, given_place(entry), &gltf::Limits::default())?;
-    let camera = gltf_camera(recipe, entry, read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?;
-    Ok(scene_of_file(read, SourceKind::Gltf, file.file_stem(), entry, file, camera))
+    let camera = gltf_camera(recipe, entry, &read).map_err(PrepError::scene(&entry.id))?;
+    let aspect = read.aspect.filter(|_| !matches!(entry.camera, Some(RecipeCamera::Given(_))));
+    let mut scene = scene_of_file(read, SourceKind::Gltf, file.file_stem(), entry, file, camera);
+    scene.findings.extend(aspect.and_then(|aspect| other_aspect(aspect, &camera, &scene.file)));
+    scene.findings.sort();
+    Ok(scene)
+}
+
+/// A note where the picture is half a row or more higher or lower than the aspect ratio of the file's camera asks for.
+fn other_aspect(aspect: f64, camera: &Camera, file: &str) -> Option<Finding> {
+    let [width, height] = [camera.intrinsics.width, camera.intrinsics.height];
+    let rows = f64::from(width) / aspect;
+    if (rows - f64::from(height)).abs() <= 0.5 + 1e-3 {
+        return None;
+    }
+    let message =
+        format!("the file's camera states {aspect:.4} for width over height, the picture has {width}x{height}");
+    let more = if rows > f64::from(height) { "more" } else { "less" };
+    let action = format!("kept the vertical field of view: the picture shows {more} at its sides");
+    Some(Finding::new(Severity::Note, "other_aspect_ratio", file, "/cameras", message, action))
 }
 
 /// The scene of a Blender file: baked to a glTF, with the light from outside that glTF does not have.
@@ -194,21 +207,20 @@ fn blend_scene(
 }
 
 /// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.
-fn gltf_camera(
-    recipe: &Recipe,
-    entry: &RecipeScene,
-    own: Option<Camera>,
-    shift_m: DVec3,
-) -> Result<Camera, SceneFault> {
-    let own_size = own.map_or(DEFAULT_SIZE, |camera| [camera.intrinsics.width, camera.intrinsics.height]);
+fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result<Camera, SceneFault> {
+    let own_size = read.camera.map_or(DEFAULT_SIZE, |camera| [camera.intrinsics.width, camera.intrinsics.height]);
     let [width, height] = picture_size(recipe, entry, own_size)?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
-        return given_camera(given, [width, height], shift_m);
+        return given_camera(given, [width, height], read.shift_m);
     }
-    let camera = own.ok_or(SceneFault::NoCameraInFile)?;
+    let camera = read.camera.ok_or_else(|| no_camera(read))?;
     let focal = camera.intrinsics.fy * f64::from(height) / f64::from(camera.intrinsics.height);
     let (cx, cy) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
     Ok(Camera { intrinsics: Intrinsics { width, height, fx: focal, fy: focal, cx, cy }, ..camera })
+}
+
+fn no_camera(read: &FileScene) -> SceneFault {
+    SceneFault::NoCameraInFile { findings: above_notes(&read.findings) }
 }
 
 /// A camera of the recipe, whose places are those of the source, in a scene from which `shift_m` was subtracted.
@@ -295,4 +307,26 @@ pub(super) fn views_of(recipe: &Recipe, camera: Camera) -> Vec<View> {
         wide: None,
     });
     std::iter::once(input).chain(turned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_of_other_proportions_than_the_cameras_is_noted() {
+        let noted = |aspect: f64, width: u32, height: u32| {
+            let intrinsics = Intrinsics::from_fov_y(width, height, 1.0);
+            let camera = Camera::look_at(DVec3::ZERO, DVec3::Z, DVec3::Y, intrinsics).unwrap();
+            other_aspect(aspect, &camera, "a.glb").map(|finding| finding.action)
+        };
+        assert!(noted(1.5, 480, 270).is_some_and(|action| action.contains("shows more")));
+        assert!(noted(1.5, 320, 240).is_some_and(|action| action.contains("shows less")));
+        // Twins: the stated proportions, exactly and rounded to whole rows.
+        for (aspect, width, height) in [(1.5, 480, 320), (16.0 / 9.0, 480, 270), (2.39, 480, 201), (1.777, 480, 270)] {
+            assert_eq!(noted(aspect, width, height), None, "{aspect}");
+        }
+    }
 }

@@ -84,6 +84,7 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<F
         origins,
         lights: SceneLights::Own,
         camera: Some(camera),
+        aspect: None,
         shift_m,
         findings: log.into_findings(),
         licence,

@@ -274,7 +274,11 @@ const MOST_NUMBERS: usize = 64;
 
 pub(super) fn number(text: &str) -> Result<f64, Invalid> {
     let trimmed = text.trim();
-    let refused = || Invalid(format!("expected a finite number, found '{}'", shortened(trimmed)));
+    let refused = || {
+        let is_comma = trimmed.replacen(',', ".", 1).parse::<f64>().is_ok();
+        let hint = if is_comma { "; write a point in place of the comma" } else { "" };
+        Invalid(format!("expected a finite number, found '{}'{hint}", shortened(trimmed)))
+    };
     trimmed.parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(refused)
 }
 
@@ -318,7 +322,13 @@ pub(super) fn triple(text: &str) -> Result<[f64; 3], Invalid> {
     match numbers(text)?[..] {
         [one] => Ok([one; 3]),
         [a, b, c] => Ok([a, b, c]),
-        ref other => Err(wrong_count("1 or 3", other.len())),
+        ref other => {
+            let Invalid(message) = wrong_count("1 or 3", other.len());
+            // `0,5 0,2 0,1` is six numbers, of which a comma parts each two that belong together.
+            let are_commas = 2 * text.split_whitespace().count() == other.len() && text.contains(',');
+            let hint = if are_commas { "; write points in place of decimal commas" } else { "" };
+            Err(Invalid(format!("{message}{hint}")))
+        }
     }
 }
 
@@ -461,6 +471,9 @@ mod tests {
         }
         assert!(triple("1 2").is_err() && triple("1 2 nan").is_err() && boolean("yes").is_err());
         assert!(numbers(&"1 ".repeat(1_000_000)).is_err());
+        assert!(number("0,3").unwrap_err().0.contains("write a point"));
+        assert!(triple("0,5 0,2 0,1").unwrap_err().0.contains("write points") && triple("0,5").is_err());
+        assert!(!triple("1, 2").unwrap_err().0.contains("write points"));
     }
 
     fn read_text(steps: &str) -> (DMat4, usize) {

@@ -5,7 +5,7 @@ use std::path::Path;
 use mateval_dataset::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
 use mateval_dataset::reference::{Emission, EmissionMap, SurfaceIndex};
 use mateval_dataset::{Severity, obj};
-use mateval_image::Texels;
+use mateval_image::{LinearRgb, Picture, Texels, exr_io};
 use mateval_testkit::shared_data;
 use proptest::prelude::*;
 
@@ -28,10 +28,12 @@ fn folder_with(xml: &str) -> tempfile::TempDir {
     std::fs::write(folder.path().join("models/a b.obj"), TRIANGLE).unwrap();
     std::fs::write(folder.path().join("plain.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     write_png(&folder.path().join("a b.png"));
+    let bytes = Picture::from_fn(2, 1, |x, _| LinearRgb([55.0 * x as f32, 200.0, 9.0]));
+    exr_io::write_linear(&folder.path().join("bytes.exr"), &bytes, exr_io::Precision::Float).unwrap();
     folder
 }
 
-/// Reads a scene from a folder with `models/a b.obj`, `plain.obj` and `a b.png`.
+/// Reads a scene from a folder with `models/a b.obj`, `plain.obj`, `a b.png`, and `bytes.exr` with numbers of 0 to 255.
 pub(crate) fn read_xml(xml: &str) -> Result<FileScene, SourceError> {
     read(&folder_with(xml).path().join("scene.xml"), None, &Limits::default())
 }

@@ -10,7 +10,7 @@ use mateval_image::{Texels, Texture, Wrap};
 use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;
 use super::reader::{Aspect, Parameters, Reader};
-use crate::source_scene::picture_fault;
+use crate::source_scene::{other_range, picture_fault};
 
 /// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
@@ -39,7 +39,15 @@ impl<'a> Reader<'a> {
             }
             return ColorInput::Constant(constant.unwrap_or([default; 3]));
         }
-        self.color_bitmap(element, from, name)
+        let color = self.color_bitmap(element, from, name);
+        if let ColorInput::Texture { texture, .. } = &color
+            && let Some(message) = other_range(&self.scene.textures[texture.0].texture)
+        {
+            let message = format!("line {}: '{}': {message}", element.line, shortened(name));
+            self.log.warn("out_of_range", &from.place, message, "used it as it is; it does not count as stated");
+            from.mark_replaced(name);
+        }
+        color
     }
 
     /// The bitmap `element`, which is the parameter `name`, as a colour. One that cannot be read is reported and

@@ -73,12 +73,13 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileS
         triangles: 0,
         vertices: 0,
         light_names: UniqueNames::default(),
+        aspect: None,
     };
     reader.report_unused();
     let camera = reader.nodes(&scene, shift_m);
     let lights = default_light(&mut reader);
     // Repairs that concern all of it.
-    let Reader { mut scene, mut origins, mut log, omitted, source, .. } = reader;
+    let Reader { mut scene, mut origins, mut log, omitted, source, aspect, .. } = reader;
     missing_uv::resolve(&mut scene, &mut origins, &mut log);
     coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
     report_omitted(omitted, &mut log);
@@ -88,6 +89,7 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileS
         origins,
         lights,
         camera,
+        aspect,
         shift_m,
         findings: log.into_findings(),
         licence,

@@ -97,9 +97,29 @@ impl Reader<'_> {
     fn camera(&mut self, node: &gltf::Node<'_>, world_from_node: DMat4, pointer: &str) -> Option<Camera> {
         let camera = node.camera()?;
         let found = perspective(&camera, world_from_node);
+        if let gltf::camera::Projection::Perspective(lens) = camera.projection()
+            && !FIELDS.contains(&f64::from(lens.yfov()))
+        {
+            let message = format!(
+                "expected a yfov of {} to {} radians, found {}; degrees must be converted",
+                FIELDS.start(),
+                FIELDS.end(),
+                lens.yfov()
+            );
+            self.log.warn("bad_value", &format!("/cameras/{}", camera.index()), message, "left the camera out");
+            return None;
+        }
         if found.is_none() {
-            let feature = "cameras that are not perspective, or have no sound direction, angle or place";
+            let feature = "cameras that are not perspective, or have no sound direction or place";
             self.omit(Omission::Visible, feature, LEFT_OUT, pointer);
+            return None;
+        }
+        self.aspect = stated_aspect(&camera);
+        if self.aspect.is_none() {
+            // The size of whatever shows it decides then (glTF 2.0, section 5.13.3), which a file does not know.
+            let message = "the camera states no width over height above 0";
+            let action = format!("used 16 to 9, {WIDTH}x270 pixels, unless the recipe states a resolution");
+            self.log.note("no_aspect_ratio", &format!("/cameras/{}", camera.index()), message, action);
         }
         found
     }
@@ -453,8 +473,7 @@ fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> Option<Came
     if !FIELDS.contains(&fov_y) {
         return None;
     }
-    let aspect = lens.aspect_ratio().map_or(ASPECT, f64::from);
-    let height = f64::from(WIDTH) / if aspect > 0.0 { aspect } else { ASPECT };
+    let height = f64::from(WIDTH) / stated_aspect(camera).unwrap_or(ASPECT);
     let height = height.clamp(*HEIGHTS.start(), *HEIGHTS.end()).round() as u32;
     // A camera looks along its -Z with +Y up, as ours does. Scale and shear do not change what it sees.
     let linear = DMat3::from_mat4(world_from_node);
@@ -464,6 +483,12 @@ fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> Option<Came
     let position = world_from_node.w_axis.truncate();
     let is_near = position.abs().max_element() <= FARTHEST_M;
     is_near.then(|| Camera::from_rotation(rotation, position, Intrinsics::from_fov_y(WIDTH, height, fov_y)))
+}
+
+/// Width over height that a perspective camera states; none unless it is above 0.
+fn stated_aspect(camera: &gltf::Camera<'_>) -> Option<f64> {
+    let gltf::camera::Projection::Perspective(lens) = camera.projection() else { return None };
+    lens.aspect_ratio().map(f64::from).filter(|aspect| *aspect > 0.0)
 }
 
 #[cfg(test)]

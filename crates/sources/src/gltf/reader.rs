@@ -39,6 +39,8 @@ pub(super) struct Reader<'a> {
     /// Vertices of all instances, with those that turned out to be faulty.
     pub(super) vertices: usize,
     pub(super) light_names: UniqueNames,
+    /// Width over height that the scene's camera states.
+    pub(super) aspect: Option<f64>,
 }
 
 impl<'a> Reader<'a> {

@@ -321,7 +321,7 @@ fn the_first_perspective_camera_counts() {
     let scene = read_json(&changed(with("/cameras", cameras), "/nodes", nodes));
     let camera = scene.camera.unwrap();
     assert_eq!(camera.position().to_array(), [0.0, 1.0, 3.0]);
-    assert_eq!((camera.intrinsics.width, camera.intrinsics.height), (480, 240));
+    assert_eq!((camera.intrinsics.width, camera.intrinsics.height, scene.aspect), (480, 240, Some(2.0)));
     assert_eq!(findings(&scene), [("not_represented", "/nodes/1")]);
 }
 
@@ -600,7 +600,7 @@ proptest! {
 /// Far from the origin, the scene is moved by whole metres and keeps its shape; near it, nothing changes.
 #[test]
 fn far_scenes_are_moved_by_whole_metres() {
-    let lens = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.01 } }]);
+    let lens = json!([{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.01, "aspectRatio": 1.5 } }]);
     let at = |place: [f64; 3]| {
         let camera = json!({ "camera": 0, "translation": [0.25, 1.5, 3.0] });
         let chair = json!({ "name": "chair", "mesh": 0, "translation": [0.5, 0.25, -1.0] });

@@ -15,7 +15,7 @@ use mateval_image::{ImageError, Texels, Texture, Wrap};
 use super::document::read_uri;
 use super::reader::{Aspect, Omission, Reader};
 use crate::missing_uv::mean_color;
-use crate::source_scene::picture_fault;
+use crate::source_scene::{other_range, picture_fault};
 
 #[derive(Clone)]
 pub(super) struct Lookup<'a> {
@@ -158,6 +158,10 @@ impl Reader<'_> {
         let encoding = if matches!(aspect, Aspect::Color(_)) { Encoding::Srgb } else { Encoding::Linear };
         let loaded = self.decode(image, encoding, wrap).and_then(|decoded| {
             let Decoded { name, sha256, color, alpha } = decoded;
+            if let (Aspect::Color(_), Some(message)) = (aspect, other_range(&color)) {
+                let pointer = format!("/images/{}", image.index());
+                self.log.warn("out_of_range", &pointer, message, "used it as it is");
+            }
             let texture = match aspect {
                 Aspect::Color(bits) => scaled(color, bits.map(f32::from_bits)),
                 Aspect::Values => Ok(color),

@@ -1,10 +1,12 @@
-//! Headers of maps that can be read but look wrong: fields that are ignored, and fields that no such map should have.
+//! Maps that can be read but look wrong: header fields that are ignored or that no such map should have, and numbers that
+//! are far smaller than those of any material.
 
 use mateval_dataset::Finding;
 use mateval_dataset::submission::Map;
 use mateval_files::untrusted::shortened;
 use mateval_image::exr_io::{ExrChannel, ExrHeader, ExrNumber};
 use mateval_image::png_io::{PngColor, PngHeader};
+use mateval_image::texture_io::FewerBits;
 use mateval_image::{Texels, Texture};
 
 use crate::error::{note, warning};
@@ -133,4 +135,64 @@ fn beyond_unit(texture: &Texture) -> Vec<Remark> {
     let beyond = values.as_flattened().iter().find(|value| !(0.0..=1.0).contains(*value));
     let remark = |value| ("beyond_unit", format!("a base colour of {value}"), "keep to 0 to 1; rendering clips it");
     beyond.map(remark).into_iter().collect()
+}
+
+/// A scene whose stored numbers are smaller, and not all 0, was written in another range: 0 and 1 as bytes in place of 0
+/// and 255, or floats that were divided once too often. No room has colours or a roughness below it throughout.
+const LEAST_LARGEST: f32 = 1.5 / 255.0;
+
+/// The largest number of a map as its file stores it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Largest {
+    Byte(u8),
+    Word(u16),
+    Float(f32),
+}
+
+impl Largest {
+    pub(super) fn of(file: &MapFile) -> Self {
+        let float = |values: &[f32]| values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let is_png = matches!(file.header, MapHeader::Png(_));
+        match file.texture.texels() {
+            Texels::Srgb8(texels) | Texels::Linear8(texels) => {
+                Self::Byte(texels.as_flattened().iter().copied().max().unwrap_or(0))
+            }
+            Texels::Grey8(texels) => Self::Byte(texels.iter().copied().max().unwrap_or(0)),
+            Texels::Srgb16(texels) => Self::Word(texels.as_flattened().iter().copied().max().unwrap_or(0)),
+            Texels::Grey(values) if is_png => Self::Word((float(values) * f32::from(u16::MAX)).round() as u16),
+            Texels::Grey(values) => Self::Float(float(values)),
+            Texels::Linear(values) => Self::Float(float(values.as_flattened())),
+        }
+    }
+
+    /// With the largest number of its type as 1.
+    fn unit(self) -> f32 {
+        match self {
+            Self::Byte(byte) => f32::from(byte) / 255.0,
+            Self::Word(word) => f32::from(word) / f32::from(u16::MAX),
+            Self::Float(value) => value,
+        }
+    }
+}
+
+/// A finding where even the largest number of all maps of one kind in a scene is that of another range. Single maps prove
+/// nothing: a screen is black, and a network's metallic of a wall is noise.
+pub(super) fn small_numbers(place: &str, map: Map, all: &[Largest]) -> Option<Finding> {
+    let largest = all.iter().map(|one| one.unit()).reduce(f32::max)?;
+    let words: Option<Vec<u16>> =
+        all.iter().map(|one| if let Largest::Word(word) = one { Some(*word) } else { None }).collect();
+    let fewer = words.and_then(|words| FewerBits::of_largest(words.into_iter().max()?));
+    let fewer = fewer.filter(|words| map != Map::Metallic || words.bits == 8 || words.largest == words.full());
+    let are_floats = all.iter().any(|one| matches!(one, Largest::Float(_)));
+    let message = if let Some(FewerBits { bits, largest }) = fewer {
+        format!("16-bit integers that reach only {largest} of 65535, as those of {bits} bits do")
+    } else if largest <= 0.0 && map == Map::BaseColor {
+        "black everywhere".to_owned()
+    } else if 0.0 < largest && largest < LEAST_LARGEST && !(map == Map::Metallic && are_floats) {
+        format!("no number above {largest:?} of 1")
+    } else {
+        return None;
+    };
+    let message = format!("all {} maps of '{}' together: {message}", all.len(), map.stem());
+    Some(warning("small_numbers", place, message, "write 1 as 255 in 8 bits, as 65535 in 16 bits, as 1.0 in EXR"))
 }

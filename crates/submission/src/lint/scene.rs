@@ -15,7 +15,7 @@ use mateval_image::{Texture, Wrap};
 use rayon::prelude::*;
 
 use super::base_colours::{self, Decoding, Readings};
-use super::map_headers;
+use super::map_headers::{self, Largest};
 use super::sight::{CoarseTexel, InstanceSight, Look, Pairs, ScalarLook, Sight, looks, scalar_looks};
 use crate::atlas::AtlasMeshes;
 use crate::error::{SubmissionError, error, note, warning};
@@ -96,6 +96,10 @@ pub(super) fn check(dataset: &Dataset, submission: &Path, scene: &SceneFile) -> 
     };
     findings.extend(exchanged_channels);
     findings.extend(base_colours::shading_baked_in(&place, &looks));
+    for map in Map::ALL {
+        let of_map = all.iter().flat_map(|facts| &facts.largest).filter(|(other, _)| *other == map);
+        findings.extend(map_headers::small_numbers(&place, map, &of_map.map(|(_, one)| *one).collect::<Vec<_>>()));
+    }
     // The other maps, and what instances have in common.
     let scalars: Vec<ScalarLook> = all.iter().flat_map(|facts| facts.scalars.iter().copied()).collect();
     findings.extend(exchanged(&place, &scalars).or_else(|| same_scalars(&place, &scalars)));
@@ -116,6 +120,8 @@ struct InstanceFacts {
     maps: usize,
     /// Memory that its maps take while a scene is scored.
     bytes: usize,
+    /// The largest number of each map.
+    largest: Vec<(Map, Largest)>,
     looks: Vec<Look>,
     scalars: Vec<ScalarLook>,
     fill: Option<Fill>,
@@ -148,6 +154,7 @@ fn instance(
         match decoded {
             Ok(file) => {
                 facts.maps += 1;
+                facts.largest.push((map, Largest::of(&file)));
                 // A clone shares its texels.
                 facts.bytes += compact_texture(file.clone(), map).bytes().len();
                 let bad_texels = file.bad_texels.clone();

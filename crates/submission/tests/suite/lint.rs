@@ -384,6 +384,54 @@ const FILE_FAULTS: &[Fault] = &[
     }),
 ];
 
+/// Each is one warning for each of both scenes, and no other; the twins are warned of by none.
+#[test]
+fn numbers_of_another_range_are_found() {
+    let rough = |root: &Path, largest: u16| {
+        for path in every(root, "roughness.png") {
+            png_io::write_ids(&path, &Picture::from_fn(64, 64, |x, _| largest / 8 * (x as u16 % 8) + largest % 8))
+                .unwrap();
+        }
+    };
+    let metal = |root: &Path, largest: u8| {
+        for path in every(root, "metallic.png") {
+            png_io::write_grey_bytes(&path, &Picture::from_fn(64, 64, |x, _| if x < 8 { largest } else { 0 })).unwrap();
+        }
+    };
+    let base = |root: &Path, factor: f32| {
+        for path in every(root, "base_color.png") {
+            let values = bytes(&path).map(|rgb| LinearRgb(rgb.map(|byte| factor * f32::from(byte))));
+            std::fs::remove_file(&path).unwrap();
+            exr_io::write_linear(&path.with_extension("exr"), &values, Precision::Float).unwrap();
+        }
+    };
+    type Plant<'a> = &'a dyn Fn(&Path);
+    let cases: [(Plant<'_>, &str); 6] = [
+        (&|root| rough(root, 4095), "as those of 12 bits do"),
+        (&|root| rough(root, 1023), "as those of 10 bits do"),
+        (&|root| metal(root, 1), "no number above 0.003921569 of 1"),
+        (&|root| base(root, 1e-33), "of 1"),
+        (&|root| change(root, |picture| picture.map(|_| [0; 3])), "black everywhere"),
+        (&|root| change(root, |picture| picture.map(|rgb| rgb.map(|byte| byte / 200))), "no number above 0.003921569"),
+    ];
+    for (plant, expected) in cases {
+        let folder = good();
+        let root = folder.path().join("gt");
+        plant(&root);
+        let file = linted(&root);
+        let found = file.findings.iter().find(|finding| finding.code == "small_numbers");
+        let found = found.unwrap_or_else(|| panic!("{expected}: {file:?}"));
+        assert!(found.count == 2 && found.examples[0].message.contains(expected), "{found:?}");
+    }
+    let twins: [Plant<'_>; 3] = [&|root| rough(root, 65535), &|root| metal(root, 3), &|root| rough(root, 7000)];
+    for plant in twins {
+        let folder = good();
+        let root = folder.path().join("gt");
+        plant(&root);
+        assert!(!codes(&linted(&root), WARNING).contains("small_numbers"));
+    }
+}
+
 /// The bytes of a map of 8 or 16 bits, three a texel.
 fn bytes(path: &Path) -> Picture<[u8; 3]> {
     let texture = read_texture(path, Encoding::Linear, Default::default()).unwrap();
@@ -459,6 +507,12 @@ const PICTURE_FAULTS: &[Fault] = &[
     ("same_roughness_metallic", WARNING, |root| {
         for path in every(root, "roughness.png") {
             std::fs::copy(&path, path.with_file_name("metallic.png")).unwrap();
+        }
+    }),
+    ("small_numbers", WARNING, |root| {
+        for path in every(root, "roughness.png") {
+            let bits = Picture::from_fn(64, 64, |x, y| u8::from((x / 8 + y / 8) % 2 == 0));
+            png_io::write_grey_bytes(&path, &bits).unwrap();
         }
     }),
     ("same_base_color", WARNING, |root| {
