@@ -510,7 +510,7 @@ const PICTURE_FAULTS: &[Fault] = &[
         }
     }),
     ("small_numbers", WARNING, |root| {
-        for path in every(root, "roughness.png") {
+        for path in every(root, "metallic.png") {
             let bits = Picture::from_fn(64, 64, |x, y| u8::from((x / 8 + y / 8) % 2 == 0));
             png_io::write_grey_bytes(&path, &bits).unwrap();
         }
