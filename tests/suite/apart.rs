@@ -108,7 +108,7 @@ fn the_second_of_two_at_one_scene_says_who_is_at_work() {
     assert!(!lease.exists());
     // Until then the manifest lists none of it.
     let faults = run(&mut verify(copy.path())).ends_with(1);
-    assert_eq!(faults.stdout.matches("run `mateval prep finish`").count(), 4, "{}", faults.stdout);
+    assert_eq!(faults.stdout.matches("run `mateval prep finish ").count(), 4, "{}", faults.stdout);
     let finished = at_once([finish(copy.path()), finish(copy.path())]);
     assert!(finished.iter().any(|done| done.code == Some(0)), "{finished:?}");
     assert!(
