@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::ids::quoted;
-use mateval_dataset::{RendererId, SceneId, ViewId};
+use mateval_dataset::{RendererId, SceneId};
 use mateval_files::FileError;
 use mateval_files::untrusted::in_words;
 
@@ -48,15 +48,11 @@ pub enum PrepError {
         found: u32,
         most: u32,
     },
-    #[error("the geometry of '{}' is perturbed already; start from the dataset with the true one", path.display())]
-    PerturbedAlready { path: PathBuf },
     /// A scene without ground truth, from which pictures of its geometry are made.
     #[error(
         "scene '{scene}' has no ground truth, without which its pictures cannot be made again; add its ground_truth/"
     )]
     NoTruth { scene: SceneId },
-    #[error("no scene of '{}' has furniture; only 3D-FRONT rooms state which objects are furniture", path.display())]
-    NoFurniture { path: PathBuf },
     #[error("list '{}': {source}", path.display())]
     List {
         path: PathBuf,
@@ -78,30 +74,15 @@ pub enum PrepError {
     /// A path given to a survey does not lie in the source's folder.
     #[error("{0}; a recipe cannot refer to it: name the folder that contains all inputs with --source")]
     OutsideSource(#[from] mateval_files::source_folder::BelowError),
-    /// A renderer made a picture of another size than the camera's.
-    #[error(
-        "scene '{scene}', view '{view}': the rendered picture has {}x{} pixels, expected {}x{}",
-        found[0], found[1], expected[0], expected[1]
-    )]
-    RenderedSize {
-        scene: SceneId,
-        view: ViewId,
-        /// Width and height of the camera's picture, in pixels.
+    /// A picture of a view has another size than its camera's.
+    #[error("{picture} has {}x{} pixels, expected {}x{}{hint}", found[0], found[1], expected[0], expected[1])]
+    PictureSize {
+        /// Which one, as in "'instance.png'".
+        picture: String,
+        /// Width and height in pixels.
         expected: [usize; 2],
-        /// Width and height of the rendered picture, in pixels.
         found: [usize; 2],
-    },
-    /// A map of a view has another size than the camera's picture.
-    #[error(
-        "'{}' has {}x{} pixels, expected the {}x{} of the view's camera; run `prep build` again",
-        path.display(), found[0], found[1], expected[0], expected[1]
-    )]
-    MapSize {
-        path: PathBuf,
-        /// Width and height of the camera's picture, in pixels.
-        expected: [usize; 2],
-        /// Width and height of the map, in pixels.
-        found: [usize; 2],
+        hint: &'static str,
     },
     /// The renderer has rendered no view of any of the scenes.
     #[error(

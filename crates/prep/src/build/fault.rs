@@ -85,14 +85,9 @@ pub enum SceneFault {
         causes(findings)
     )]
     NoCameraInFile { findings: Vec<Finding> },
-    #[error("the house has no room '{room}'; it has '{}'", rooms.join("', '"))]
-    NoRoom { room: String, rooms: Vec<String> },
-    #[error("the house has no designer's camera {number}; it has {}", listed(known))]
-    NoDesignersCamera {
-        number: usize,
-        /// The numbers of the house's cameras.
-        known: Vec<usize>,
-    },
+    /// The house has no such room, or no such designer's camera.
+    #[error("the house has no {wanted}; it has {known}")]
+    NotInHouse { wanted: String, known: String },
     /// No drawn camera was accepted.
     #[error(transparent)]
     DrawnCamera(#[from] CameraError),
@@ -174,9 +169,4 @@ fn causes(findings: &[Finding]) -> String {
 
 fn joined<T: std::fmt::Display>(faults: &[T]) -> String {
     faults.iter().map(T::to_string).collect::<Vec<_>>().join("; ")
-}
-
-fn listed(numbers: &[usize]) -> String {
-    let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
-    if numbers.is_empty() { "none".to_owned() } else { numbers.join(", ") }
 }

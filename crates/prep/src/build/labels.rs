@@ -9,6 +9,7 @@ use std::path::Path;
 
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Finding, PartSetId, Severity};
+use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, SourceFolder};
 use mateval_files::untrusted::shortened;
 use mateval_image::limits::Malformed;
@@ -27,30 +28,16 @@ const MAX_NAMES: usize = 10;
 pub enum LabelFault {
     #[error("part_labels: '{folder}' has no file '<instance>.npy' for any instance")]
     NoFiles { folder: String },
-    #[error("part_labels: cannot list '{folder}': {source}")]
-    Unlistable { folder: String, source: std::io::Error },
+    #[error("part_labels: {0}")]
+    Unreadable(FileError),
     /// A file lies outside of the folder, cannot be read or is too large.
     #[error(transparent)]
     File(#[from] FileFault),
-    #[error("cannot read '{file}': {source}")]
-    Unreadable { file: String, source: std::io::Error },
-    /// A file is larger than the instance's labels can be.
-    #[error("'{file}' has {found} bytes; expected {triangles} labels, at most {most} bytes")]
-    TooLarge {
-        file: String,
-        /// Its size in bytes.
-        found: u64,
-        /// The largest size allowed, in bytes.
-        most: u64,
-        triangles: usize,
-    },
+    /// A file has another number of bytes, labels or different labels than its instance may have.
+    #[error("'{file}' has {found}; expected {expected}")]
+    Count { file: String, found: String, expected: String },
     #[error("'{file}': {source}")]
     Array { file: String, source: Malformed },
-    /// A file has another number of labels than its instance has triangles.
-    #[error("'{file}' has {found} labels; expected {expected}, one for each triangle in the order of instances.glb")]
-    Count { file: String, found: usize, expected: usize },
-    #[error("'{file}' has {found} different labels; expected at most {MAX_PARTS}")]
-    TooManyLabels { file: String, found: usize },
     /// All labels together are more parts than pictures can hold.
     #[error(transparent)]
     TooMany(#[from] TooMany),
@@ -110,8 +97,8 @@ fn unused(
     instances: &[InstanceEntry],
 ) -> Result<Option<Finding>, LabelFault> {
     let used: BTreeSet<String> = instances.iter().map(|instance| format!("{}.npy", instance.id)).collect();
-    let unlistable = |source| LabelFault::Unlistable { folder: labels.to_owned(), source };
-    let names = file_names(&folder.root().join(labels)).map_err(unlistable)?;
+    let names = file_names(&folder.root().join(labels));
+    let names = names.map_err(FileError::io("list", labels)).map_err(LabelFault::Unreadable)?;
     let unused: Vec<String> = names.difference(&used).map(|name| format!("'{}'", shortened(name))).collect();
     let shown = unused[..unused.len().min(MAX_NAMES)].join(", ");
     let rest = unused.len().saturating_sub(MAX_NAMES);
@@ -141,28 +128,29 @@ fn labels_of_instance(
     mesh: &mateval_dataset::TriangleMesh,
 ) -> Result<Option<Vec<usize>>, LabelFault> {
     let triangles = mesh.triangles.len();
-    let named = || file.to_owned();
+    let unfit = |found: String, expected: String| LabelFault::Count { file: file.to_owned(), found, expected };
     let relative = SourceFolder::relative(file)?;
     let most = npy_io::most_bytes(triangles);
     match folder.path(&relative) {
         Err(fault) if fault.code == "missing_file" => return Ok(None),
         Err(fault) => return Err(fault.into()),
         Ok(path) => {
-            let unreadable = |source| LabelFault::Unreadable { file: named(), source };
-            let found = path.metadata().map_err(unreadable)?.len();
+            let found = path.metadata().map_err(FileError::io("read", file)).map_err(LabelFault::Unreadable)?.len();
             if found > most {
-                return Err(LabelFault::TooLarge { file: named(), found, most, triangles });
+                let expected = format!("{triangles} labels, at most {most} bytes");
+                return Err(unfit(format!("{found} bytes"), expected));
             }
         }
     }
     let bytes = folder.read(&relative)?;
-    let labels = npy_io::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: named(), source })?;
+    let labels = npy_io::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: file.to_owned(), source })?;
     if labels.len() != triangles {
-        return Err(LabelFault::Count { file: named(), found: labels.len(), expected: triangles });
+        let expected = format!("{triangles}, one for each triangle in the order of instances.glb");
+        return Err(unfit(format!("{} labels", labels.len()), expected));
     }
     let different: BTreeSet<i64> = labels.iter().copied().collect();
     if different.len() > MAX_PARTS {
-        return Err(LabelFault::TooManyLabels { file: named(), found: different.len() });
+        return Err(unfit(format!("{} different labels", different.len()), format!("at most {MAX_PARTS}")));
     }
     let number: BTreeMap<i64, usize> = different.into_iter().zip(0..).collect();
     let labels: Vec<usize> = labels.iter().map(|label| number[label]).collect();

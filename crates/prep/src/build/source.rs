@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::dataset::View;
+use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::ReferenceScene;
@@ -240,8 +241,9 @@ fn front3d_scene(
 ) -> Result<SourceScene, PrepError> {
     let house = front3d::furnish(&house_files(root, room), &front3d::Limits::default())?;
     let Some(number) = house.house.room(&room.room) else {
-        let rooms = house.house.rooms.iter().map(|room| room.id.clone()).collect();
-        return Err(PrepError::scene(&entry.id)(SceneFault::NoRoom { room: room.room.clone(), rooms }));
+        let rooms: Vec<&str> = house.house.rooms.iter().map(|room| room.id.as_str()).collect();
+        let (wanted, known) = (format!("room '{}'", room.room), quoted(&rooms));
+        return Err(PrepError::scene(&entry.id)(SceneFault::NotInHouse { wanted, known }));
     };
     // The camera sampler and the choice of surfaces that the views see share one world.
     let world = World::new(house.scene.clone())?;
@@ -276,8 +278,9 @@ fn room_camera(
         Some(RecipeCamera::Given(given)) => given_camera(given, resolution, house.shift_m),
         Some(RecipeCamera::Designer(number)) => {
             let Some(camera) = house.cameras.iter().find(|camera| camera.number == *number) else {
-                let known = house.cameras.iter().map(|camera| camera.number).collect();
-                return Err(SceneFault::NoDesignersCamera { number: *number, known });
+                let known: Vec<String> = house.cameras.iter().map(|camera| camera.number.to_string()).collect();
+                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                return Err(SceneFault::NotInHouse { wanted: format!("designer's camera {number}"), known });
             };
             let (position, target) = (camera.position.to_array(), camera.target.to_array());
             given_camera(&GivenCamera { position, target, fov_y_deg: camera.fov_y_deg }, resolution, DVec3::ZERO)

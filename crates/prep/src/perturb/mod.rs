@@ -53,7 +53,8 @@ pub fn perturb(
     let dataset = Dataset::open(root)?;
     dataset.check_whole()?;
     if dataset.file.geometry.is_some() {
-        return Err(PrepError::PerturbedAlready { path: root.to_owned() });
+        let why = "has geometry that is perturbed already; start from the dataset with the true one";
+        return Err(PrepError::unusable(root, why));
     }
     if let Some(scene) = dataset.scenes.iter().find(|scene| !dataset.folder(&scene.id).reference().is_dir()) {
         return Err(PrepError::NoTruth { scene: scene.id.clone() });
@@ -83,7 +84,8 @@ pub fn perturb(
         perturbed.push(write_scene(&dataset.folder(&scene.id), &to, scene, amount, options.seed)?);
     }
     if perturbed.iter().all(|scene| scene.moved == 0) {
-        return Err(PrepError::NoFurniture { path: root.to_owned() });
+        let why = "has no scene with furniture; only 3D-FRONT rooms state which objects are furniture";
+        return Err(PrepError::unusable(root, why));
     }
     // The files that describe the whole.
     let perturbation = Perturbation { kind: options.kind, level: options.level };

@@ -18,7 +18,7 @@ use serde::Deserialize;
 
 use crate::error::PrepError;
 pub(crate) use fault::RESOLUTION;
-use fault::{RecipeFault, check_sizes};
+use fault::{RecipeFault, ValueFault, check_sizes};
 pub(crate) use scene::SourcePath;
 pub use scene::{AppearanceWord, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource};
 
@@ -83,16 +83,19 @@ impl Recipe {
         let mut faults = Vec::new();
         let is_shown = |text: &str| !text.trim().is_empty() && !text.chars().any(char::is_control);
         if !is_shown(&self.name) {
-            faults.push(RecipeFault::Name { found: self.name.clone() });
+            let expected = "a name of at least one letter, without control characters";
+            faults.push(ValueFault::new("name", format!("{:?}", self.name), expected).into());
         }
         if !is_shown(&self.version) {
-            faults.push(RecipeFault::Version { found: self.version.clone() });
+            let expected = "a version such as `0.1.0`, without control characters";
+            faults.push(ValueFault::new("version", format!("{:?}", self.version), expected).into());
         }
         if self.scenes.is_empty() {
             faults.push(RecipeFault::NoScenes);
         }
         if self.samples == 0 || self.samples > MOST_SAMPLES {
-            faults.push(RecipeFault::Samples { found: self.samples, most: MOST_SAMPLES });
+            let expected = format!("1 to {MOST_SAMPLES}");
+            faults.push(ValueFault::new("samples", self.samples.to_string(), expected).into());
         }
         self.check_views(&mut faults);
         check_sizes("the recipe", self.resolution, self.atlas_size, &mut faults);
@@ -119,7 +122,9 @@ impl Recipe {
                 faults.push(RecipeFault::TurnedId { id: view.id.clone() });
             }
             if !(view.x_deg.abs() <= 90.0 && view.y_deg.abs() <= 180.0) {
-                faults.push(RecipeFault::Turns { id: view.id.clone(), x_deg: view.x_deg, y_deg: view.y_deg });
+                let found = format!("[{}, {}]", view.x_deg, view.y_deg);
+                let expected = "at most 90 degrees about X and 180 about Y";
+                faults.push(ValueFault::new(format!("view '{}': [x_deg, y_deg]", view.id), found, expected).into());
             }
         }
         self.wide.iter().for_each(|wide| wide.check(faults));
@@ -210,22 +215,25 @@ impl TryFrom<WideWords> for WideViews {
 impl WideViews {
     /// Adds a fault for every number that is out of range.
     pub(super) fn check(&self, faults: &mut Vec<RecipeFault>) {
+        let (least, most) = DISTANCES_M.into_inner();
         match self {
             Self::Drawn(DrawnViews { count, distance_m: [near, far], .. }) => {
                 if !COUNTS.contains(count) {
-                    faults.push(RecipeFault::WideCount { found: *count, least: *COUNTS.start(), most: *COUNTS.end() });
+                    let expected = format!("{} to {}", COUNTS.start(), COUNTS.end());
+                    faults.push(ValueFault::new("wide: count", count.to_string(), expected).into());
                 }
                 if !(DISTANCES_M.contains(near) && DISTANCES_M.contains(far) && near <= far) {
-                    let (least, most) = DISTANCES_M.into_inner();
-                    faults.push(RecipeFault::WideDistance { found: [*near, *far], least, most });
+                    let expected = format!("two rising numbers from {least} to {most}");
+                    faults.push(ValueFault::new("wide: distance_m", format!("{:?}", [near, far]), expected).into());
                 }
             }
             Self::Given(views) => {
                 for WideOffset { id, offset_m } in views {
                     let distance = glam::DVec3::from_array(*offset_m).length();
                     if !DISTANCES_M.contains(&distance) {
-                        let (least, most) = DISTANCES_M.into_inner();
-                        faults.push(RecipeFault::WideOffset { id: id.clone(), found: *offset_m, least, most });
+                        let key = format!("wide: view '{id}': offset_m");
+                        let expected = format!("a length of {least} to {most} m");
+                        faults.push(ValueFault::new(key, format!("{offset_m:?}"), expected).into());
                     }
                     if !id.is_wide() {
                         faults.push(RecipeFault::WideId { id: id.clone() });

@@ -5,13 +5,11 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::{PartSetId, SceneId};
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::shortened;
 use mateval_sources::front3d::AppearanceRule;
 use serde::Deserialize;
 
-use super::fault::{FARTHEST_M, RecipeFault, RecipeSceneFault, check_sizes};
-
-/// The keys of a scene that name its source.
-const SOURCE_KEYS: [&str; 4] = ["bitterli", "front3d", "gltf", "blend"];
+use super::fault::{FARTHEST_M, RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -130,7 +128,7 @@ impl RecipeScene {
         let mut named = [bitterli, front3d, gltf, blend].into_iter().flatten();
         match (named.next(), named.next()) {
             (Some(source), None) => Ok(source),
-            _ => Err(RecipeSceneFault::NotOneSource { keys: &SOURCE_KEYS }),
+            _ => Err(RecipeSceneFault::NotOneSource),
         }
     }
 
@@ -184,10 +182,11 @@ impl RecipeScene {
         if let Some(photo) =
             self.photo.as_ref().filter(|photo| SourceFolder::relative(&photo.to_string_lossy()).is_err())
         {
-            own.push(RecipeSceneFault::PhotoPath { file: photo.clone(), root: self.root_name() });
+            let expected = format!("a file below {}, relative to it", self.root_name());
+            own.push(ValueFault::new("photo", format!("'{}'", photo.display()), expected).into());
         }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
-            own.push(RecipeSceneFault::Exposure { found: self.exposure });
+            own.push(ValueFault::new("exposure", self.exposure.to_string(), "a number above 0").into());
         }
         self.check_inputs(&mut own);
         if !self.camera.as_ref().is_none_or(RecipeCamera::is_in_range) {
@@ -219,10 +218,11 @@ impl RecipeScene {
     }
 
     fn check_label_folders(&self, faults: &mut Vec<RecipeSceneFault>) {
-        let root = self.root_name();
         for (set, folder) in &self.part_labels {
             if SourceFolder::relative(&folder.to_string_lossy()).is_err() {
-                faults.push(RecipeSceneFault::LabelFolder { set: set.clone(), folder: folder.clone(), root });
+                let expected = format!("a folder below {}, relative to it", self.root_name());
+                let key = format!("part_labels.{set}");
+                faults.push(ValueFault::new(key, format!("'{}'", folder.display()), expected).into());
             }
         }
     }
@@ -233,7 +233,10 @@ impl RecipeScene {
                 faults.push(RecipeSceneFault::InputPath { file: file.clone() });
             }
             if hash.len() != 64 || !hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f')) {
-                faults.push(RecipeSceneFault::InputHash { file: file.clone(), found: hash.clone() });
+                let expected = "a SHA-256, 64 lower-case hexadecimal digits";
+                faults.push(
+                    ValueFault::new(format!("inputs: '{file}'"), format!("'{}'", shortened(hash)), expected).into(),
+                );
             }
         }
     }

@@ -218,13 +218,10 @@ impl BlenderScene<'_> {
     ) -> Result<(), PrepError> {
         let (width, height) = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
         let [a, b] = &pictures.halves;
-        if (a.rgb.width(), a.rgb.height()) != (width, height) {
-            return Err(PrepError::RenderedSize {
-                scene: self.id.clone(),
-                view: view.id.clone(),
-                expected: [width, height],
-                found: [a.rgb.width(), a.rgb.height()],
-            });
+        let (expected, found) = ([width, height], [a.rgb.width(), a.rgb.height()]);
+        if found != expected {
+            let picture = format!("scene '{}', view '{}': the rendered picture", self.id, view.id);
+            return Err(PrepError::PictureSize { picture, expected, found, hint: "" });
         }
         let file = RenderFile {
             renderer: self.run.renderer.clone(),

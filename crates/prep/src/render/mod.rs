@@ -251,5 +251,9 @@ fn map_of<T: Copy>(
     let map = read(path)?;
     let k = view.camera.intrinsics;
     let (expected, found) = ([k.width as usize, k.height as usize], [map.width(), map.height()]);
-    if found == expected { Ok(map) } else { Err(PrepError::MapSize { path: path.to_owned(), expected, found }) }
+    if found == expected {
+        return Ok(map);
+    }
+    let (picture, hint) = (format!("'{}'", path.display()), "; run `prep build` again");
+    Err(PrepError::PictureSize { picture, expected, found, hint })
 }
