@@ -70,7 +70,7 @@ fn stages(files: &HouseFiles) -> [f64; 6] {
     note(2);
     let room = (0..house.wanted_pieces.len()).max_by_key(|&room| house.wanted_pieces[room]).unwrap();
     let views = views(&house, room);
-    let scene = room_scene(&house, &world, room, &views).scene;
+    let scene = room_scene(&house, &world, room, &views).read.scene;
     note(3);
     let unwrapped: Vec<_> = scene
         .surfaces

@@ -8,7 +8,7 @@ use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 use mateval_files::FileError;
-use mateval_files::source_folder::{FileFault, SourceFolder};
+use mateval_files::source_folder::{FileFault, LookedFor, SourceFolder};
 use mateval_image::texture_io::FewerBits;
 use mateval_image::{ImageError, Texels, Texture};
 
@@ -62,13 +62,17 @@ pub struct Missing {
 
 impl Missing {
     /// Of the files that a scene names, those that do not exist.
-    pub(crate) fn files(read: &[(String, String)], absent: &[String]) -> Self {
-        let files: Vec<String> = absent.iter().filter(|file| !is_optional(file)).cloned().collect();
-        Self { what: "files that the scene names", wanted: read.len().saturating_sub(1) + files.len(), files }
+    pub(crate) fn files(looked_for: &LookedFor) -> Self {
+        let files: Vec<String> = looked_for.absent.iter().filter(|file| !is_optional(file)).cloned().collect();
+        Self {
+            what: "files that the scene names",
+            wanted: looked_for.hashes.len().saturating_sub(1) + files.len(),
+            files,
+        }
     }
 }
 
-/// A scene as the reader of one file gives it.
+/// A scene as its reader gives it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileScene {
     /// Surfaces, materials, textures and lights, in world space.
@@ -88,10 +92,8 @@ pub struct FileScene {
     pub findings: Vec<Finding>,
     /// The licence file beside the scene, if any.
     pub licence: Option<LicenceText>,
-    /// Every file that was read, relative to the scene's folder with forward slashes, and its SHA-256 in hex; sorted.
-    pub files: Vec<(String, String)>,
-    /// Every file that was looked for but is missing; sorted.
-    pub absent: Vec<String>,
+    /// The files, relative to the scene's folder with forward slashes.
+    pub files: LookedFor,
     /// What the scene cannot do without and is missing.
     pub missing: Missing,
 }
@@ -100,8 +102,6 @@ pub struct FileScene {
 #[derive(Clone, Debug)]
 pub struct SourceScene {
     pub kind: SourceKind,
-    /// Whether the source describes the scene's lights.
-    pub lights: SceneLights,
     /// Whether the source states the roughness of its materials; otherwise it is a constant of the reader.
     pub states_roughness: bool,
     /// Whether the source states which materials are metallic; otherwise none is.
@@ -110,23 +110,9 @@ pub struct SourceScene {
     pub house: String,
     /// The file that findings refer to by default.
     pub file: String,
-    /// Geometry, materials and lights in world space. Each surface becomes an instance.
-    pub scene: ReferenceScene,
-    /// Facts about each surface, in the order of `scene.surfaces`.
-    pub origins: Vec<InstanceOrigin>,
+    /// What was read. Each surface becomes an instance.
+    pub read: FileScene,
     pub camera: Camera,
-    /// What was subtracted from the source's positions, in metres.
-    pub shift_m: DVec3,
-    /// Faults of the input; sorted.
-    pub findings: Vec<Finding>,
-    /// The licence beside the source, if any.
-    pub licence: Option<LicenceText>,
-    /// Every file that was read and its SHA-256 in hex; sorted.
-    pub files: Vec<(String, String)>,
-    /// Every file that was looked for but is missing; sorted.
-    pub absent: Vec<String>,
-    /// What the scene cannot do without and is missing.
-    pub missing: Missing,
 }
 
 /// The licence beside the scene. A scene must not be passed on without it, so an unreadable licence is a finding.

@@ -11,7 +11,7 @@ use mateval_dataset::{Finding, Role, SceneLights, Severity, json};
 use mateval_files::FileError;
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_sources::source_scene::SourceScene;
+use mateval_sources::source_scene::FileScene;
 use serde::{Deserialize, Serialize};
 
 use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
@@ -201,7 +201,7 @@ impl Baked {
 
     /// Adds to the scene of the GLB, which lies in the folder `out`, what glTF does not have: the light from outside,
     /// lamps without a body, and which base colours nobody states.
-    pub fn complete(&self, read: &mut SourceScene, out: &Path) -> Result<(), PrepError> {
+    pub fn complete(&self, read: &mut FileScene, out: &Path) -> Result<(), PrepError> {
         add_world(read, self, out)?;
         hide_lamps(read, self);
         let is_unstated = |material: &&BakedMaterial| material.base_color == "unstated";
@@ -225,7 +225,7 @@ fn is_rotation(rows: [[f32; 3]; 3]) -> bool {
 }
 
 /// Replaces the light of a glTF without lights by the file's own light from outside.
-fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), PrepError> {
+fn add_world(read: &mut FileScene, baked: &Baked, out: &Path) -> Result<(), PrepError> {
     if read.lights == SceneLights::Stage {
         read.scene.lights.clear();
         read.findings.retain(|finding| finding.code != "no_light");
@@ -246,7 +246,7 @@ fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), Pr
 }
 
 /// Makes area lamps what they are in Blender: light that has no body.
-fn hide_lamps(read: &mut SourceScene, baked: &Baked) {
+fn hide_lamps(read: &mut FileScene, baked: &Baked) {
     for lamp in &baked.lamps {
         let Some(at) = read.scene.surfaces.iter().position(|surface| surface.name == lamp.node) else { continue };
         read.scene.surfaces[at].material = read.scene.add_material(Material::new("light", MaterialModel::clear()));

@@ -24,7 +24,7 @@ mod wide_views;
 
 use std::path::Path;
 
-use mateval_dataset::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SceneSource, SourceFile};
+use mateval_dataset::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SourceFile};
 use mateval_dataset::glb::{self, GlbNode};
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::SceneFolder;
@@ -156,12 +156,12 @@ fn build_scene(
     // The source, with numbered instances and parts.
     progress(Report::step("read the source", 0, 1));
     let read = read_source(recipe, entry, source, &Baking { blender, folder: folder.path(), progress })?;
-    let licence = read.licence.clone();
-    let missing = check_missing(entry, &read.missing, &entry.root(source), &read.file, &read.findings);
+    let licence = read.read.licence.clone();
+    let missing = check_missing(entry, &read.read.missing, &entry.root(source), &read.file, &read.read.findings);
     let missing = missing.map_err(PrepError::scene(&entry.id))?;
     let (mut plan, absent) = make_plan(recipe, entry, source, read)?;
     plan.findings.extend(missing);
-    check_inputs(entry, &plan.files)?;
+    check_inputs(entry, &plan.source.files)?;
     make_folders(folder, &plan)?;
 
     // Views and atlases. Only instances with an appearance can have an atlas.
@@ -203,17 +203,17 @@ fn build_scene(
 }
 
 /// Fails if the recipe pins files and any file that was read or pinned differs.
-fn check_inputs(entry: &RecipeScene, files: &[(String, String)]) -> Result<(), PrepError> {
+fn check_inputs(entry: &RecipeScene, files: &[SourceFile]) -> Result<(), PrepError> {
     if entry.inputs.is_empty() {
         return Ok(());
     }
-    let differs = |(path, sha256): &(String, String)| match entry.inputs.get(path) {
+    let differs = |SourceFile { path, sha256 }: &SourceFile| match entry.inputs.get(path) {
         Some(pinned) if pinned == sha256 => None,
         Some(pinned) => Some(PinFault::Changed { file: path.clone(), found: sha256.clone(), pinned: pinned.clone() }),
         None => Some(PinFault::Unlisted { file: path.clone() }),
     };
     let mut faults: Vec<PinFault> = files.iter().filter_map(differs).collect();
-    let read = |path: &String| files.iter().any(|file| file.0 == *path);
+    let read = |path: &String| files.iter().any(|file| file.path == *path);
     let unread = entry.inputs.keys().filter(|path| !read(path));
     faults.extend(unread.map(|path| PinFault::Unread { file: path.clone() }));
     if faults.is_empty() {
@@ -263,9 +263,9 @@ fn write_scene_file(
     atlases: &[InstanceAtlas],
     folder: &SceneFolder,
 ) -> Result<(), PrepError> {
-    let instances = plan.instances.iter().zip(&plan.scene.surfaces).zip(atlases).zip(&plan.stated);
+    let instances = plan.instances.iter().zip(&plan.scene.surfaces).zip(atlases).zip(&plan.origins);
     let instances = instances
-        .map(|(((instance, surface), atlas), stated)| Instance {
+        .map(|(((instance, surface), atlas), origin)| Instance {
             id: instance.id.clone(),
             index: instance.index,
             name: surface.name.clone(),
@@ -273,7 +273,7 @@ fn write_scene_file(
             category: instance.category.clone(),
             super_category: instance.super_category.clone(),
             triangles: surface.mesh.triangles.len(),
-            unstated: stated.unstated(),
+            unstated: origin.stated.unstated(),
             atlas: atlas.unwrapped.as_ref().map(|unwrapped| Atlas {
                 size: unwrapped.size,
                 charts: unwrapped.charts,
@@ -291,20 +291,12 @@ fn write_scene_file(
             Some(id) => part_sets.push(PartSet { id: id.clone(), parts: split.listed(&plan.instances) }),
         }
     }
-    let files = plan.files.into_iter().map(|(path, sha256)| SourceFile { path, sha256 }).collect();
     let mut findings = plan.findings;
     findings.sort();
     let file = SceneFile {
         format: FORMAT.to_owned(),
         id: entry.id.clone(),
-        source: SceneSource {
-            kind: plan.kind,
-            house: plan.house,
-            states_roughness: plan.states_roughness,
-            states_metallic: plan.states_metallic,
-            shift_m: plan.shift_m.to_array(),
-            files,
-        },
+        source: plan.source,
         lights: plan.lights,
         materials: recipe.materials,
         exposure: entry.exposure,

@@ -48,15 +48,14 @@ pub(super) fn read_photo(
     let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
     let photo = photo_of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
     let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(SceneFault::Photo(fault)))?;
-    scene.files.extend(folder.into_files().hashes);
-    scene.files.sort();
-    scene.files.dedup();
+    scene.read.files.extend(folder.into_files());
+    scene.read.files.hashes.dedup();
     if photo.transparent_share > 0.0 {
         let message = format!("{:.1} % of its pixels have an alpha below 1", 100.0 * photo.transparent_share);
         let action = "used their colours as they are stored";
         let file = photo.listed.file.clone();
-        scene.findings.push(Finding::new(Severity::Warning, "transparent_photo", file, "", message, action));
-        scene.findings.sort();
+        scene.read.findings.push(Finding::new(Severity::Warning, "transparent_photo", file, "", message, action));
+        scene.read.findings.sort();
     }
     Ok(Some(photo))
 }

@@ -3,16 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::DVec3;
-use mateval_dataset::dataset::{TrueMaterials, View};
-use mateval_dataset::material::StatedParameters;
+use mateval_dataset::dataset::{SceneSource, SourceFile, TrueMaterials, View};
 use mateval_dataset::material::{ClassifiedPart, MaterialClass};
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::reference::SourceMaterials;
-use mateval_dataset::{Finding, SceneLights, SourceKind, TriangleMesh};
+use mateval_dataset::{Finding, SceneLights, TriangleMesh};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
-use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
+use mateval_sources::source_scene::{FileScene, InstanceOrigin, SourceScene};
 use mateval_tracer::World;
 
 use super::fault::SceneFault;
@@ -27,24 +25,14 @@ use crate::recipe::{Recipe, RecipeScene};
 
 /// A scene with numbered instances and parts and with the cameras of all views.
 pub(super) struct Plan {
-    /// Where the scene came from.
-    pub(super) kind: SourceKind,
-    /// The house that it belongs to.
-    pub(super) house: String,
+    pub(super) source: SceneSource,
     pub(super) lights: SceneLights,
-    /// What was subtracted from the source's positions, in metres.
-    pub(super) shift_m: DVec3,
-    /// Which parameters of each instance's material the source states.
-    pub(super) stated: Vec<StatedParameters>,
-    /// Whether the source states roughness and metallic.
-    pub(super) states_roughness: bool,
-    pub(super) states_metallic: bool,
+    /// Facts about each instance.
+    pub(super) origins: Vec<InstanceOrigin>,
     pub(super) scene: Arc<ReferenceScene>,
     /// The source's own materials, where they were converted.
     pub(super) source_materials: Option<SourceMaterials>,
     pub(super) instances: Vec<InstanceEntry>,
-    /// The shape that each instance is a copy of, where the source moves copies of a model.
-    pub(super) shapes: Vec<Option<Arc<TriangleMesh>>>,
     /// The source's own parts first.
     pub(super) part_splits: Vec<PartSplit>,
     /// The class of material of each of the source's own parts, in their order, where the source's reader states
@@ -56,8 +44,6 @@ pub(super) struct Plan {
     pub(super) findings: Vec<Finding>,
     /// The file that findings refer to by default.
     pub(super) file: String,
-    /// Every file read and its SHA-256; sorted.
-    pub(super) files: Vec<(String, String)>,
 }
 
 impl Plan {
@@ -66,7 +52,7 @@ impl Plan {
         let mesh = &self.scene.surfaces[instance].mesh;
         let is_same =
             |shape: &&TriangleMesh| shape.triangles == mesh.triangles && shape.positions.len() == mesh.positions.len();
-        self.shapes[instance].as_deref().filter(is_same).unwrap_or(mesh)
+        self.origins[instance].shape.as_deref().filter(is_same).unwrap_or(mesh)
     }
 }
 
@@ -76,18 +62,20 @@ pub(super) fn make_plan(
     recipe: &Recipe,
     entry: &RecipeScene,
     source: &Path,
-    mut read: SourceScene,
+    mut source_scene: SourceScene,
 ) -> Result<(Plan, Vec<String>), PrepError> {
-    if read.scene.surfaces.is_empty() {
-        return Err(PrepError::scene(&entry.id)(SceneFault::NoSurfaces { findings: read.findings }));
+    if source_scene.read.scene.surfaces.is_empty() {
+        return Err(PrepError::scene(&entry.id)(SceneFault::NoSurfaces { findings: source_scene.read.findings }));
     }
-    let instances = list_instances(&read.scene, &read.origins).map_err(PrepError::scene(&entry.id))?;
-    let own = PartSplit::own(&read.scene, &read.origins, &instances).map_err(PrepError::scene(&entry.id))?;
-    let classes = classified_parts(&own, &read.origins);
-    let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
-    let photo = read_photo(entry, source, &mut read)?;
-    let mut views = views_of(recipe, read.camera);
-    let SourceScene { kind, lights, states_roughness, states_metallic, file, files, absent, .. } = read;
+    let instances =
+        list_instances(&source_scene.read.scene, &source_scene.read.origins).map_err(PrepError::scene(&entry.id))?;
+    let own = PartSplit::own(&source_scene.read.scene, &source_scene.read.origins, &instances)
+        .map_err(PrepError::scene(&entry.id))?;
+    let classes = classified_parts(&own, &source_scene.read.origins);
+    let part_splits = part_splits(entry, source, &instances, own, &mut source_scene.read)?;
+    let photo = read_photo(entry, source, &mut source_scene)?;
+    let mut views = views_of(recipe, source_scene.camera);
+    let SourceScene { kind, states_roughness, states_metallic, house, file, read, camera } = source_scene;
     let mut findings = read.findings;
     let (scene, source_materials) = match recipe.materials {
         TrueMaterials::Source => (read.scene, None),
@@ -102,31 +90,33 @@ pub(super) fn make_plan(
     if let Some(wide) = &recipe.wide {
         let scored: Vec<bool> =
             scene.surfaces.iter().map(|surface| scene.materials[surface.material.0].has_appearance()).collect();
-        let (found, lost) = wide_views(wide, &World::new(scene.clone())?, &read.camera, &scored, &file);
+        let (found, lost) = wide_views(wide, &World::new(scene.clone())?, &camera, &scored, &file);
         views.extend(found);
         findings.extend(lost);
     }
-    let plan = Plan {
+    let source = SceneSource {
         kind,
-        house: entry.house.clone().unwrap_or(read.house),
-        lights,
-        shift_m: read.shift_m,
-        stated: read.origins.iter().map(|origin| origin.stated).collect(),
+        house: entry.house.clone().unwrap_or(house),
         states_roughness,
         states_metallic,
+        shift_m: read.shift_m.to_array(),
+        files: read.files.hashes.into_iter().map(|(path, sha256)| SourceFile { path, sha256 }).collect(),
+    };
+    let plan = Plan {
+        source,
+        lights: read.lights,
+        origins: read.origins,
         scene,
         source_materials,
         instances,
-        shapes: read.origins.into_iter().map(|origin| origin.shape).collect(),
         part_splits,
         classes,
         views,
         photo,
         findings,
         file,
-        files,
     };
-    Ok((plan, absent))
+    Ok((plan, read.files.absent))
 }
 
 /// The classes of the source's own parts; absent if its reader states none.
@@ -149,7 +139,7 @@ fn part_splits(
     source: &Path,
     instances: &[InstanceEntry],
     own: PartSplit,
-    read: &mut SourceScene,
+    read: &mut FileScene,
 ) -> Result<Vec<PartSplit>, PrepError> {
     let root = entry.root(source);
     let mut folder = SourceFolder::new(&root, MAX_LABEL_BYTES).map_err(FileError::io("open", &root))?;
@@ -164,11 +154,7 @@ fn part_splits(
     if !faults.is_empty() {
         return Err(PrepError::scene(&entry.id)(SceneFault::Labels { faults }));
     }
-    let labels = folder.into_files();
-    read.files.extend(labels.hashes);
-    read.files.sort();
-    read.absent.extend(labels.absent);
-    read.absent.sort();
+    read.files.extend(folder.into_files());
     splits.insert(0, own);
     Ok(splits)
 }

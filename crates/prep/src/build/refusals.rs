@@ -149,7 +149,7 @@ fn folders_below(root: &Path) -> Vec<PathBuf> {
 /// The finding about base colours that are not stated, if any are. Fails where they cover too much of the picture.
 pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, SceneFault> {
     let all: usize = seen.input_pixels.iter().sum();
-    let is_unstated = |at: &usize| !plan.stated[*at].base_color && seen.input_pixels[*at] > 0;
+    let is_unstated = |at: &usize| !plan.origins[*at].stated.base_color && seen.input_pixels[*at] > 0;
     let mut unstated: Vec<usize> = (0..plan.instances.len()).filter(is_unstated).collect();
     if unstated.is_empty() {
         return Ok(None);

@@ -99,20 +99,12 @@ fn scene_of_file(
 ) -> SourceScene {
     SourceScene {
         kind,
-        lights: read.lights,
         states_roughness: states(&read.scene, &read.origins, |stated| stated.roughness),
         states_metallic: states(&read.scene, &read.origins, |stated| stated.metallic),
         house: house.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
         file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        scene: read.scene,
-        origins: read.origins,
+        read,
         camera,
-        shift_m: read.shift_m,
-        findings: read.findings,
-        licence: read.licence,
-        files: read.files,
-        absent: read.absent,
-        missing: read.missing,
     }
 }
 
@@ -152,8 +144,8 @@ fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, path: &Path, file: &Path) ->
     let camera = gltf_camera(recipe, entry, &read).map_err(PrepError::scene(&entry.id))?;
     let aspect = read.aspect.filter(|_| !matches!(entry.camera, Some(RecipeCamera::Given(_))));
     let mut scene = scene_of_file(read, SourceKind::Gltf, file.file_stem(), entry, file, camera);
-    scene.findings.extend(aspect.and_then(|aspect| other_aspect(aspect, &camera, &scene.file)));
-    scene.findings.sort();
+    scene.read.findings.extend(aspect.and_then(|aspect| other_aspect(aspect, &camera, &scene.file)));
+    scene.read.findings.sort();
     Ok(scene)
 }
 
@@ -190,21 +182,20 @@ fn blend_scene(
     let path = root.join(file);
     let baked = bake(&options.program, &options.limits, &path, BAKED_TEXEL_M, &out, &mut show)?;
     let (glb, baked) = baked.map_err(fault)?;
-    let mut read = gltf_scene(recipe, entry, &glb, file)?;
-    read.kind = SourceKind::Blend;
-    baked.complete(&mut read, &out)?;
+    let mut scene = gltf_scene(recipe, entry, &glb, file)?;
+    scene.kind = SourceKind::Blend;
+    baked.complete(&mut scene.read, &out)?;
     // The files are those of the .blend, not of the glTF.
-    read.findings.extend(baked.findings.iter().map(|finding| finding.of_file(&read.file)));
-    read.findings.sort();
+    scene.read.findings.extend(baked.findings.iter().map(|finding| finding.of_file(&scene.file)));
+    scene.read.findings.sort();
     let mut folder =
         SourceFolder::new(path.parent().unwrap_or(root), u64::MAX - 1).map_err(FileError::io("open", root))?;
-    for name in std::iter::once(&read.file).chain(&baked.files) {
+    for name in std::iter::once(&scene.file).chain(&baked.files) {
         folder.read(name).map_err(|fault| FileError::io("read", name)(std::io::Error::other(fault)))?;
     }
-    let files = folder.into_files();
-    (read.files, read.absent, read.missing) = (files.hashes, files.absent, Missing::default());
+    (scene.read.files, scene.read.missing) = (folder.into_files(), Missing::default());
     std::fs::remove_dir_all(&out).map_err(FileError::io("remove", &out))?;
-    Ok(read)
+    Ok(scene)
 }
 
 /// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.

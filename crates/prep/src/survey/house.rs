@@ -123,8 +123,8 @@ impl<'a> HouseSearch<'a> {
                 part.house.findings = FindingCount::of(furnished.findings.iter());
                 part.house.rooms = rooms;
                 let file = |(path, sha256): (String, String)| SourceFile { path, sha256 };
-                part.files = furnished.files.into_iter().map(file).collect();
-                part.absent = furnished.absent;
+                part.files = furnished.files.hashes.into_iter().map(file).collect();
+                part.absent = furnished.files.absent;
                 (part, pictures)
             }
         }

@@ -89,8 +89,7 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<F
         findings: log.into_findings(),
         licence,
         missing: missing(&document, left_out, &files.absent),
-        files: files.hashes,
-        absent: files.absent,
+        files,
     })
 }
 

@@ -89,7 +89,7 @@ fn included_files_stand_in_their_place_and_paths_are_searched() {
     let shape = "<shape type='obj'><string name='filename' value='t.obj'/><transform name='to_world'><scale value='$n'/></transform></shape>";
     let scene = read_with(&format!("<scene version='3.0.0'>{shape}</scene>")).unwrap();
     assert_eq!((codes(&scene), scene.scene.surfaces[0].mesh.positions[1].x), (vec![], 2.0));
-    assert!(scene.files.iter().any(|(file, _)| file == "parts/t.obj"));
+    assert!(scene.files.hashes.iter().any(|(file, _)| file == "parts/t.obj"));
     for (text, word) in [
         ("<scene version='3.0.0'><include filename='parts/more.xml'/></scene>", "includes itself"),
         ("<scene version='3.0.0'><include filename='../more.xml'/></scene>", "leads out"),
@@ -215,7 +215,7 @@ fn surfaces_lights_and_camera_are_those_of_the_xml() {
     assert_eq!(scale, 3.0);
     // A quarter turn about y takes +z to +x.
     assert!((world_from_environment[0][2] - 1.0).abs() < 1e-6);
-    let files: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
+    let files: Vec<_> = files.hashes.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(files, ["a b.png", "models/a b.obj", "scene.xml"]);
 }
 

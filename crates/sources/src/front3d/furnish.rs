@@ -69,10 +69,8 @@ pub struct FurnishedHouse {
     pub wanted_pieces: Vec<usize>,
     /// Faults of the input; sorted.
     pub findings: Vec<Finding>,
-    /// Every file that was read, relative to the root, and its SHA-256; sorted.
-    pub files: Vec<(String, String)>,
-    /// Every file that was looked for but is missing; sorted.
-    pub absent: Vec<String>,
+    /// The files, relative to the root.
+    pub files: LookedFor,
 }
 
 /// Paths of a house and its library.
@@ -129,7 +127,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     appearances.report_untextured(&mut log);
     let Appearances { materials, textures, .. } = appearances;
     let mut scene = ReferenceScene { surfaces, materials, textures, lights: Vec::new() };
-    let mut origins: Vec<InstanceOrigin> = placed.iter().map(|placed| placed.origin.clone()).collect();
+    let mut origins: Vec<InstanceOrigin> = placed.iter_mut().map(|placed| std::mem::take(&mut placed.origin)).collect();
     for split in missing_uv::resolve(&mut scene, &mut origins, &mut log) {
         placed.push(placed[split].clone());
     }
@@ -152,8 +150,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
         placed,
         wanted_pieces,
         findings: log.into_findings(),
-        files: looked_for.hashes,
-        absent: looked_for.absent,
+        files: looked_for,
     })
 }
 

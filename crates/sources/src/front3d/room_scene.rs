@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::furnish::FurnishedHouse;
 use super::house::{ChildKind, Room};
 use super::material_class::AppearanceRule;
-use crate::source_scene::{Missing, SourceScene};
+use crate::source_scene::{FileScene, Missing, SourceScene};
 
 /// The most characters of a name before an appended number.
 const LONGEST_NAME: usize = 40;
@@ -37,20 +37,23 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     let states = house.appearance != AppearanceRule::Constant;
     SourceScene {
         kind: SourceKind::Front3d,
-        lights: SceneLights::Stage,
         states_roughness: states,
         states_metallic: states,
         house: house.house.uid.clone(),
         file: house.file.clone(),
-        scene,
-        origins: kept.iter().map(|&surface| house.placed[surface].origin.clone()).collect(),
+        read: FileScene {
+            scene,
+            origins: kept.iter().map(|&surface| house.placed[surface].origin.clone()).collect(),
+            lights: SceneLights::Stage,
+            camera: None,
+            aspect: None,
+            shift_m: house.shift_m,
+            findings: house.findings.clone(),
+            licence: None,
+            files: house.files.clone(),
+            missing: missing(house, room),
+        },
         camera: views[0],
-        shift_m: house.shift_m,
-        findings: house.findings.clone(),
-        licence: None,
-        files: house.files.clone(),
-        absent: house.absent.clone(),
-        missing: missing(house, room),
     }
 }
 
@@ -74,7 +77,7 @@ fn missing_textures(house: &FurnishedHouse, room: usize) -> Missing {
     });
     let ids = materials.filter_map(|material| house.house.materials[material].texture.as_deref());
     let ends: BTreeSet<String> = ids.map(|id| format!("{id}/texture.png")).collect();
-    let absent = |end: &String| house.absent.iter().find(|path| path.ends_with(end.as_str())).cloned();
+    let absent = |end: &String| house.files.absent.iter().find(|path| path.ends_with(end.as_str())).cloned();
     let (wanted, mut files) = (ends.len(), ends.iter().filter_map(absent).collect::<Vec<_>>());
     if files.len() < wanted {
         files.clear();
@@ -104,7 +107,7 @@ fn missing_furniture(house: &FurnishedHouse, room: usize) -> Missing {
         missing.wanted += 1;
         // The path as findings give it, where the file does not exist at all.
         let end = lost.map(|file| format!("{}/{file}", record.jid));
-        let path = end.map(|end| house.absent.iter().find(|path| path.ends_with(&end)).cloned().unwrap_or(end));
+        let path = end.map(|end| house.files.absent.iter().find(|path| path.ends_with(&end)).cloned().unwrap_or(end));
         missing.files.extend(path);
     }
     missing

@@ -93,9 +93,8 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileS
         shift_m,
         findings: log.into_findings(),
         licence,
-        missing: Missing::files(&files.hashes, &files.absent),
-        files: files.hashes,
-        absent: files.absent,
+        missing: Missing::files(&files),
+        files,
     })
 }
 

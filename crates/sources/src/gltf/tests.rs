@@ -202,7 +202,7 @@ fn textures_are_colours_and_channels() {
         (textures[color.0].name.as_str(), textures[color.0].texture.wrap()),
         ("a b.png", mateval_image::Wrap::Clamp)
     );
-    assert!(textures[color.0].sha256.is_some() && scene.files.iter().any(|(file, _)| file == "a b.png"));
+    assert!(textures[color.0].sha256.is_some() && scene.files.hashes.iter().any(|(file, _)| file == "a b.png"));
     assert_eq!(textures[color.0].texture.texel(0, 0), [1.0, 0.0, 0.0]);
     // Factors multiply linear values.
     let half = textured(json!({ "pbr": { "baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0.25 } }));

@@ -187,7 +187,7 @@ fn materials_of_models_are_their_pictures() {
         assert_eq!(texture_name(house, color(number)), name);
         let texture = house.scene.textures.iter().find(|texture| texture.name == name).unwrap();
         assert_eq!(texture.sha256.as_ref().map(String::len), Some(64));
-        assert!(house.files.contains(&(name, texture.sha256.clone().unwrap())));
+        assert!(house.files.hashes.contains(&(name, texture.sha256.clone().unwrap())));
     }
 }
 

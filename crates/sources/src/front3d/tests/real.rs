@@ -61,8 +61,8 @@ fn assert_room(house: &FurnishedHouse, world: &World, room: usize) {
     let camera =
         Camera::look_at(middle, middle + glam::DVec3::new(1.0, -0.2, 0.3), glam::DVec3::Y, intrinsics).unwrap();
     let scene = room_scene::room_scene(house, world, room, &[camera]);
-    assert!(scene.scene.surfaces.len() >= own.count());
-    assert!(scene.scene.surfaces.iter().all(|surface| surface.material.0 < scene.scene.materials.len()));
+    assert!(scene.read.scene.surfaces.len() >= own.count());
+    assert!(scene.read.scene.surfaces.iter().all(|surface| surface.material.0 < scene.read.scene.materials.len()));
     assert_eq!(scene.house, house.house.uid);
 }
 

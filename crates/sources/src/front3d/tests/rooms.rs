@@ -288,7 +288,7 @@ fn scene_from(number: usize) -> SourceScene {
 fn in_house(scene: &SourceScene) -> Vec<usize> {
     let house = furnished();
     let of = |surface: &Surface| house.scene.surfaces.iter().position(|own| own.mesh == surface.mesh).unwrap();
-    scene.scene.surfaces.iter().map(of).collect()
+    scene.read.scene.surfaces.iter().map(of).collect()
 }
 
 /// The surfaces that a grid of single rays through the picture hits.
@@ -302,7 +302,7 @@ fn only_visible_parts_of_other_rooms_are_kept() {
     let house = furnished();
     let scene = scene_from(1);
     let kept = in_house(&scene);
-    assert_eq!(scene.origins.len(), kept.len());
+    assert_eq!(scene.read.origins.len(), kept.len());
     let met = met(&snapshot(1), 300);
     let is_furniture = |at: &usize| house.placed[*at].origin.role.is_furniture();
     let of_room = |room: usize| (0..house.placed.len()).filter(move |at| house.placed[*at].room == room);
@@ -331,12 +331,13 @@ fn only_visible_parts_of_other_rooms_are_kept() {
 #[test]
 fn names_are_unique_as_ids() {
     let scene = scene_from(1);
-    let ids: BTreeSet<String> = scene.scene.surfaces.iter().map(|surface| id_text_from(&surface.name, "")).collect();
-    assert_eq!(ids.len(), scene.scene.surfaces.len());
-    assert!(scene.scene.surfaces.iter().any(|surface| surface.name == "Dining Chair 4"));
-    assert!(scene.scene.surfaces.iter().any(|surface| surface.name.starts_with("MasterBedroom-102 ")));
-    let lights: BTreeSet<&str> = scene.scene.lights.iter().map(|light| light.name.as_str()).collect();
-    assert_eq!(lights.len(), scene.scene.lights.len());
+    let ids: BTreeSet<String> =
+        scene.read.scene.surfaces.iter().map(|surface| id_text_from(&surface.name, "")).collect();
+    assert_eq!(ids.len(), scene.read.scene.surfaces.len());
+    assert!(scene.read.scene.surfaces.iter().any(|surface| surface.name == "Dining Chair 4"));
+    assert!(scene.read.scene.surfaces.iter().any(|surface| surface.name.starts_with("MasterBedroom-102 ")));
+    let lights: BTreeSet<&str> = scene.read.scene.lights.iter().map(|light| light.name.as_str()).collect();
+    assert_eq!(lights.len(), scene.read.scene.lights.len());
 }
 
 /// Untrusted names that collide with each other's numbered form, that have the maximum length of an id, or that equal
@@ -351,11 +352,11 @@ fn untrusted_names_are_unique_too() {
     }
     let scene = room_scene::room_scene(&house, world(), LIVING, &[snapshot(1)]);
     let ids: BTreeSet<String> =
-        scene.scene.surfaces.iter().map(|surface| id_text_from(&surface.name, "object")).collect();
-    assert_eq!(ids.len(), scene.scene.surfaces.len());
+        scene.read.scene.surfaces.iter().map(|surface| id_text_from(&surface.name, "object")).collect();
+    assert_eq!(ids.len(), scene.read.scene.surfaces.len());
     assert!(!ids.contains("world"));
-    let lights: BTreeSet<&str> = scene.scene.lights.iter().map(|light| light.name.as_str()).collect();
-    assert_eq!(lights.len(), scene.scene.lights.len());
+    let lights: BTreeSet<&str> = scene.read.scene.lights.iter().map(|light| light.name.as_str()).collect();
+    assert_eq!(lights.len(), scene.read.scene.lights.len());
 }
 
 /// One group for each colour of ceiling and room, one for each lamp, and the world, whose emission alone is visible to
@@ -377,7 +378,7 @@ fn lights_are_ceilings_lamps_and_the_world() {
             _ => {}
         }
     }
-    let lights = &scene.scene.lights;
+    let lights = &scene.read.scene.lights;
     assert_eq!(lights.len(), ceilings.len() + lamps.len() + 1);
     assert!(ceilings.len() >= 2 && lamps.len() >= 2, "{ceilings:?} {lamps:?}");
     for light in lights {
@@ -391,7 +392,7 @@ fn lights_are_ceilings_lamps_and_the_world() {
                     && lamps.contains(&lamp)
                 {
                     assert_eq!(*radiance, [7.0; 3]);
-                    let material = &scene.scene.materials[scene.scene.surfaces[lamp].material.0];
+                    let material = &scene.read.scene.materials[scene.read.scene.surfaces[lamp].material.0];
                     let MaterialModel::Principled { base_color, .. } = material.model else { panic!("{material:?}") };
                     let map = map.expect("a lamp of the house has a texture");
                     assert_eq!(base_color, ColorInput::Texture { texture: map.texture, uv: map.uv });
@@ -412,7 +413,7 @@ fn a_room_can_be_rendered() {
     let house = furnished();
     let scene = scene_from(1);
     for (own, at) in in_house(&scene).into_iter().enumerate() {
-        let material = &scene.scene.materials[scene.scene.surfaces[own].material.0];
+        let material = &scene.read.scene.materials[scene.read.scene.surfaces[own].material.0];
         let source = &house.scene.materials[house.scene.surfaces[at].material.0];
         assert_eq!(material.name, source.name);
         let texture = |model: &MaterialModel| match model {
@@ -420,14 +421,14 @@ fn a_room_can_be_rendered() {
             _ => None,
         };
         let names = (
-            texture(&material.model).map(|at| &scene.scene.textures[at].name),
+            texture(&material.model).map(|at| &scene.read.scene.textures[at].name),
             texture(&source.model).map(|at| &house.scene.textures[at].name),
         );
         assert_eq!(names.0, names.1);
     }
     // Unused materials and textures are removed.
-    assert!(scene.scene.textures.len() < house.scene.textures.len());
-    let world = World::new(Arc::new(scene.scene)).unwrap();
+    assert!(scene.read.scene.textures.len() < house.scene.textures.len());
+    let world = World::new(Arc::new(scene.read.scene)).unwrap();
     let settings = RenderSettings { samples: 1, ..RenderSettings::default() };
     let made = render(&world, &scene.camera, &settings, &|_, _| ()).unwrap();
     assert_eq!(made.stats.not_finite, 0);
