@@ -286,7 +286,7 @@ fn every_adapter_finds_the_material_in_the_files_of_its_method() {
             assert!(errors.into_iter().all(|error| error < 0.04), "{name}: {errors:?}");
         }
         // Twin: with every other encoding that is far from the method's, the base colour is off.
-        for other in StoredEncoding::ALL {
+        for &other in StoredEncoding::ALL {
             let mut wrong = adapter.clone();
             let file = wrong.base_color.as_mut().unwrap();
             if (file.encoding == StoredEncoding::Linear) == (other == StoredEncoding::Linear) {

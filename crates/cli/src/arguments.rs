@@ -4,10 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_dataset::open::{Dataset, enclosing_dataset};
+use mateval_dataset::word_enum::UnknownWord;
 use mateval_submission::SubmissionError;
 use mateval_submission::archive::{self, Opened};
 
@@ -173,4 +175,13 @@ impl EstimateArgs {
         };
         Ok(source)
     }
+}
+
+/// Reads one of the words of an enum. `listed` gives each word and its line in the help.
+pub fn word_parser<T>(all: &[T], listed: fn(&T) -> (&'static str, &'static str)) -> impl TypedValueParser<Value = T>
+where
+    T: std::str::FromStr<Err = UnknownWord> + Clone + Send + Sync + 'static,
+{
+    let words = all.iter().map(listed).map(|(word, help)| PossibleValue::new(word).help(help));
+    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
 }

@@ -7,7 +7,7 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use anyhow::bail;
-use clap::{ArgMatches, Args as _, FromArgMatches, Subcommand, ValueEnum};
+use clap::{ArgMatches, Args as _, FromArgMatches, Subcommand};
 use mateval_baselines::delight::{self, CandidateLights, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::fill::FillRule;
@@ -18,7 +18,7 @@ use mateval_baselines::submission::Baseline;
 use mateval_baselines::{BASELINES, bridges};
 use mateval_dataset::PartSetId;
 
-use crate::arguments::{EstimateArgs, ExportPlaces, Places};
+use crate::arguments::{EstimateArgs, ExportPlaces, Places, word_parser};
 use crate::terminal::{Outcome, counted, print, with_progress};
 
 /// Subcommands of `baseline`, one per method.
@@ -163,33 +163,24 @@ pub struct DelightArgs {
     #[command(flatten)]
     places: ExportPlaces,
     /// Which lights may shine.
-    #[arg(long, value_enum, default_value_t = Lights::Room)]
-    lights: Lights,
+    #[arg(long, value_parser = word_parser(CandidateLights::ALL, shown_lights), default_value = "room")]
+    lights: CandidateLights,
 }
 
-/// Which lights may shine while a photo is de-lit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Lights {
-    /// Light fixtures, ceilings, what is seen to glow, the world around, and the lights of a stage.
-    Room,
-    /// The lights of a stage alone, as in PSDR-Room.
-    Stage,
-}
-
-impl Lights {
-    /// The same as an option of the baseline.
-    pub fn candidates(self) -> CandidateLights {
-        match self {
-            Self::Room => CandidateLights::Room,
-            Self::Stage => CandidateLights::Stage,
+fn shown_lights(lights: &CandidateLights) -> (&'static str, &'static str) {
+    let help = match lights {
+        CandidateLights::Room => {
+            "Light fixtures, ceilings, what is seen to glow, the world around, and the lights of a stage"
         }
-    }
+        CandidateLights::Stage => "The lights of a stage alone, as in PSDR-Room",
+    };
+    (lights.word(), help)
 }
 
 impl DelightArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let dataset = self.places.open()?;
-        let options = DelightOptions { lights: self.lights.candidates(), ..DelightOptions::default() };
+        let options = DelightOptions { lights: self.lights, ..DelightOptions::default() };
         let out = &self.places.out;
         let count = with_progress(|progress| delight::write(&dataset, out, &options, progress))?;
         let shown = out.display();
@@ -208,14 +199,14 @@ pub struct ProceduralArgs {
     #[command(flatten)]
     estimate: EstimateArgs,
     /// Which lights may shine while the photo is de-lit; for --estimate delight [default: room].
-    #[arg(long, value_enum)]
-    lights: Option<Lights>,
+    #[arg(long, value_parser = word_parser(CandidateLights::ALL, shown_lights))]
+    lights: Option<CandidateLights>,
     /// The part set, such as `partfield` [default: the parts of the source].
     #[arg(long)]
     part_set: Option<PartSetId>,
     /// How graphs are chosen.
-    #[arg(long, value_enum, default_value_t = Mode::Best)]
-    mode: Mode,
+    #[arg(long, value_parser = word_parser(FitMode::ALL, shown_mode), default_value = "best")]
+    mode: FitMode,
     /// Keep the estimate in texels that the input view shows, and let graphs fill only the others.
     #[arg(long)]
     keep_seen: bool,
@@ -227,29 +218,26 @@ pub struct ProceduralArgs {
     graphs: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Mode {
-    /// Orientation and sizes in closed form; a graph is taken if held-out pixels speak for it.
-    Best,
-    /// In the way of PSDR-Room, for comparison: a grid of turns and scales, then gradient descent.
-    Paper,
+fn shown_mode(mode: &FitMode) -> (&'static str, &'static str) {
+    let help = match mode {
+        FitMode::Best => "Orientation and sizes in closed form; a graph is taken if held-out pixels speak for it",
+        FitMode::Paper => "In the way of PSDR-Room, for comparison: a grid of turns and scales, then gradient descent",
+    };
+    (mode.word(), help)
 }
 
 impl ProceduralArgs {
     /// Writes the submission and its report.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let default = EstimateSource::Delight(Lights::Room.candidates());
+        let default = EstimateSource::Delight(CandidateLights::Room);
         let source = match (self.estimate.source(default)?, self.lights) {
-            (EstimateSource::Delight(_), Some(lights)) => EstimateSource::Delight(lights.candidates()),
+            (EstimateSource::Delight(_), Some(lights)) => EstimateSource::Delight(lights),
             (source, None) => source,
             (_, Some(_)) => bail!("--lights is for --estimate delight alone; other estimates are not lit"),
         };
         let options = ProceduralOptions {
             part_set: self.part_set.clone(),
-            mode: match self.mode {
-                Mode::Best => FitMode::Best,
-                Mode::Paper => FitMode::Paper,
-            },
+            mode: self.mode,
             keep_seen: self.keep_seen,
             detail: self.detail,
             graphs: self.graphs.clone(),

@@ -270,7 +270,7 @@ impl Options {
         format!(
             "{}, {}, {} samples, {width}x{height} pixels, {}, {lpips} LPIPS",
             self.tool,
-            self.renderer.name(),
+            self.renderer.word(),
             self.samples,
             names.join(","),
         )
@@ -330,7 +330,7 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
     if references.rendered > 0 {
         with_progress(|progress| finish_again(&places.dataset, progress)).context("cannot finish the dataset")?;
     }
-    let (by, samples) = (options.renderer.name(), options.samples);
+    let (by, samples) = (options.renderer.word(), options.samples);
     let kept = if report.kept > 0 { format!(", {} kept", report.kept) } else { String::new() };
     let rendered = counted(report.rendered, "picture");
     Ok(format!("{rendered} by {by}{kept}, 2 x {}", counted(samples as usize, "sample")))

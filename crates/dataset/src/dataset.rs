@@ -394,34 +394,24 @@ pub enum SceneLights {
     Stage,
 }
 
-/// A way in which the furniture that methods see differs from the true one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PerturbationKind {
+crate::word_enum! {
+    /// A way in which the furniture that methods see differs from the true one.
+    PerturbationKind, a "kind of perturbation":
     /// Every piece is moved in the plane of the floor and turned about the vertical.
-    Pose,
+    Pose = "pose",
     /// Every piece is enlarged or reduced.
-    Scale,
+    Scale = "scale",
     /// The surface of every piece is bent.
-    Shape,
+    Shape = "shape",
 }
 
 impl PerturbationKind {
-    pub const ALL: [Self; 3] = [Self::Pose, Self::Scale, Self::Shape];
-
     /// The highest level; the lowest is 1.
     pub fn most_level(self) -> u32 {
         match self {
             Self::Pose | Self::Shape => 3,
             Self::Scale => 2,
         }
-    }
-}
-
-/// The word that JSON files and commands use.
-impl fmt::Display for PerturbationKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.serialize(f)
     }
 }
 

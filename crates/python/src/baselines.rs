@@ -269,11 +269,9 @@ pub fn delight<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Delit> {
     let listener = Listener::of(py, progress)?;
-    let lights = match lights {
-        "room" => CandidateLights::Room,
-        "stage" => CandidateLights::Stage,
-        other => return Err(PyValueError::new_err(format!("lights: expected 'room' or 'stage', found '{other}'"))),
-    };
+    let lights: CandidateLights = lights
+        .parse()
+        .map_err(|_| PyValueError::new_err(format!("lights: expected 'room' or 'stage', found '{lights}'")))?;
     let options = DelightOptions { lights, ..DelightOptions::default() };
     let source = Arc::clone(&scene.source);
     let delit = run_long(py, &listener, move |progress| -> Result<DelitPhoto, BaselineError> {

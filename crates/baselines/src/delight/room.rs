@@ -7,7 +7,7 @@ use glam::DVec2;
 use mateval_dataset::dataset::Instance;
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
-use mateval_dataset::{Camera, SceneError, glb};
+use mateval_dataset::{Camera, SceneError, glb, word_enum};
 use mateval_image::exr_io::read_linear;
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use mateval_light::candidates::{Candidate, add_candidates, sky_extent_deg};
@@ -21,14 +21,12 @@ use serde::Serialize;
 use crate::error::BaselineError;
 use crate::geometry::{SceneGeometry, photo_file};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CandidateLights {
+word_enum! {
+    CandidateLights, a "set of lights":
     /// What may glow in the room, the world around it, and the lights of a stage.
-    #[default]
-    Room,
+    Room = "room",
     /// The lights of a stage alone, as in PSDR-Room.
-    Stage,
+    Stage = "stage",
 }
 
 /// The least number of pixels that show that something glows, and how much: fewer may show edges alone.

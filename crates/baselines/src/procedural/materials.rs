@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 use mateval_dataset::dataset::Instance;
-use mateval_dataset::{PartSetId, Progress, Report};
+use mateval_dataset::{PartSetId, Progress, Report, word_enum};
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter, LEAST_POINTS};
 use mateval_procedural::fit::paper::fit_as_paper;
@@ -34,15 +34,14 @@ use crate::estimate::{Estimate, GivenMaps, Values};
 use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels};
 use crate::maps::{DEFAULT, Medians, median};
 
-/// How a graph is chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum FitMode {
+word_enum! {
+    /// How a graph is chosen.
+    FitMode, a "way to choose graphs":
     /// Orientation and sizes in closed form, acceptance by held-out pixels.
-    #[default]
-    Best,
+    Best = "best",
     /// In the way of PSDR-Room, for comparison: a grid of turns and scales, then gradient descent
     /// ([`mateval_procedural::fit::paper`] states the differences).
-    Paper,
+    Paper = "paper",
 }
 
 /// How the materials of parts are found and baked.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, bail};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
 use mateval_dataset::SceneId;
 use mateval_dataset::dataset::PerturbationKind;
 use mateval_eval::light::reference::{RELEASE_SAMPLES, ReferenceOptions, make_references};
@@ -21,7 +21,7 @@ use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, s
 use mateval_sources::front3d::camera_rules::CameraRules;
 
 use crate::TOOL;
-use crate::arguments::check_outside_datasets;
+use crate::arguments::{check_outside_datasets, word_parser};
 use crate::fetch::{cache_folder, check_blender};
 use crate::terminal::{Outcome, counted, print, say, say_findings, with_progress};
 
@@ -50,7 +50,7 @@ pub struct SurveyArgs {
     #[arg(long = "list", value_name = "LIST.csv")]
     lists: Vec<PathBuf>,
     /// The rules that drawn cameras keep. They also decide on resolution and field of view where none is given.
-    #[arg(long, default_value = CameraRules::default().name(), value_parser = camera_rules_parser())]
+    #[arg(long, default_value = CameraRules::default().word(), value_parser = word_parser(CameraRules::ALL, |rules| (rules.word(), rules.summary())))]
     camera_rules: CameraRules,
     /// Choose this many scenes for the recipe, which together are like the paper's: with 13.2 objects of 4.3
     /// super-categories on average, and equally many of each room type. Without it the recipe has every accepted room.
@@ -173,12 +173,6 @@ fn report_selection(recipe: &Path, selection: &Selection) -> anyhow::Result<Outc
         return Ok(Outcome::No);
     }
     Ok(Outcome::Good)
-}
-
-/// Parses the name of a set of camera rules; the help text lists them.
-fn camera_rules_parser() -> impl TypedValueParser<Value = CameraRules> {
-    let names = CameraRules::ALL.map(|rules| PossibleValue::new(rules.name()).help(rules.summary()));
-    PossibleValuesParser::new(names).try_map(|name| name.parse::<CameraRules>())
 }
 
 #[derive(clap::Args)]
@@ -344,10 +338,9 @@ enum Only {
     Scorer,
 }
 
-/// Reads a renderer's name; the help lists every renderer with its summary.
+/// Reads a renderer's word; the help lists every renderer with its summary.
 pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
-    let names = RendererKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(kind.summary()));
-    PossibleValuesParser::new(names).try_map(|name| name.parse::<RendererKind>())
+    word_parser(RendererKind::ALL, |kind| (kind.word(), kind.summary()))
 }
 
 /// Reads a number of samples, as large as a recipe's may be.
@@ -458,8 +451,8 @@ pub struct PerturbArgs {
     /// Folder of the dataset, with its ground truth.
     dataset: PathBuf,
     /// How the furniture differs from the true one.
-    #[arg(long, value_enum)]
-    kind: Kind,
+    #[arg(long, value_parser = word_parser(PerturbationKind::ALL, shown_kind))]
+    kind: PerturbationKind,
     /// How far: 0 (not at all) to 3 for pose and shape, to 2 for scale.
     #[arg(long)]
     level: u32,
@@ -474,24 +467,13 @@ pub struct PerturbArgs {
     force: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Kind {
-    /// Moved on the floor by 1, 5, 10 cm and turned by 1, 5, 5 degrees.
-    Pose,
-    /// Enlarged or reduced by 2, 5 %.
-    Scale,
-    /// Bent by at most 0.5, 1, 3 cm.
-    Shape,
-}
-
-impl From<Kind> for PerturbationKind {
-    fn from(kind: Kind) -> Self {
-        match kind {
-            Kind::Pose => Self::Pose,
-            Kind::Scale => Self::Scale,
-            Kind::Shape => Self::Shape,
-        }
-    }
+fn shown_kind(kind: &PerturbationKind) -> (&'static str, &'static str) {
+    let help = match kind {
+        PerturbationKind::Pose => "Moved on the floor by 1, 5, 10 cm and turned by 1, 5, 5 degrees",
+        PerturbationKind::Scale => "Enlarged or reduced by 2, 5 %",
+        PerturbationKind::Shape => "Bent by at most 0.5, 1, 3 cm",
+    };
+    (kind.word(), help)
 }
 
 impl PerturbArgs {
@@ -499,7 +481,7 @@ impl PerturbArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         check_free(&self.out, self.force, "--out")?;
         check_outside_datasets(&self.out, "--out")?;
-        let options = PerturbOptions { kind: self.kind.into(), level: self.level, seed: self.seed };
+        let options = PerturbOptions { kind: self.kind, level: self.level, seed: self.seed };
         let scenes = with_progress(|progress| perturb(&self.dataset, &self.out, &options, progress))
             .context("cannot perturb the dataset")?;
         print(&scenes.iter().map(perturbed_line).collect::<String>())?;

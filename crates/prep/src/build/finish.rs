@@ -213,7 +213,7 @@ fn is_input_picture(path: &str) -> bool {
 /// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no
 /// photo from elsewhere; absent if none has, or where all scenes have one.
 fn photo_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
-    let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
+    let mut known = RendererKind::ALL.iter().map(|kind| kind.id());
     let rendered: Vec<SceneId> = dataset.scenes.iter().filter(|id| !is_photographed(root, id)).cloned().collect();
     known.find(|renderer| !rendered.is_empty() && rendered.iter().all(|id| is_complete(root, id, renderer)))
 }
@@ -225,7 +225,7 @@ fn is_photographed(root: &Path, id: &SceneId) -> bool {
 
 /// The first renderer that has rendered every view of some scene.
 fn any_renderer(root: &Path, scenes: &[SceneId]) -> Option<RendererId> {
-    let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
+    let mut known = RendererKind::ALL.iter().map(|kind| kind.id());
     known.find(|renderer| scenes.iter().any(|id| is_complete(root, id, renderer)))
 }
 

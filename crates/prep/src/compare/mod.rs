@@ -86,7 +86,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
             version: dataset.file.version.clone(),
             manifest_sha256: dataset.file.manifest_sha256.clone(),
         },
-        renderer: COMPARED.name().to_owned(),
+        renderer: COMPARED.to_string(),
         bounds: BOUNDS,
         agrees: true,
         scenes: Vec::new(),

@@ -206,7 +206,7 @@ mod tests {
     /// No vertex moves further than the level states, and higher levels move each further, by the same seed.
     #[test]
     fn levels_are_distances_that_grow() {
-        for kind in PerturbationKind::ALL {
+        for &kind in PerturbationKind::ALL {
             assert_eq!(amounts(kind).len() as u32, kind.most_level());
             let mut last = 0.0;
             for amount in amounts(kind) {

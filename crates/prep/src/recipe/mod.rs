@@ -323,7 +323,7 @@ mod tests {
     #[test]
     fn camera_rules_have_names() {
         let with = |words: &str| recipe_of(&format!("name = 'x'\n{words}\n[[scene]]\nid = 'a'\nbitterli = 'a'\n"));
-        let name = |recipe: Recipe| recipe.camera_rules.name();
+        let name = |recipe: Recipe| recipe.camera_rules.word();
         assert_eq!(name(with("camera_rules = '3dlg'").unwrap()), "3dlg");
         assert_eq!(name(with("").unwrap()), "blenderproc");
         let error = with("camera_rules = 'mine'").unwrap_err().to_string();

@@ -32,7 +32,7 @@ use crate::build::start::is_build;
 use crate::error::PrepError;
 use crate::recipe::{self, RECIPE};
 pub use blender::BlenderOptions;
-pub use run::{MAX_BOUNCES, RenderReport, RendererKind, UnknownRenderer};
+pub use run::{MAX_BOUNCES, RenderReport, RendererKind};
 use run::{RenderRun, ViewRender, seed, seed_texts, write_view};
 
 #[derive(Clone, Debug, Default)]

@@ -3,14 +3,13 @@
 //! The pictures lie in `ground_truth/renders/<renderer>/<view>/`.
 
 use std::path::Path;
-use std::str::FromStr;
 
 use mateval_dataset::dataset::View;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::manifest::change_scene;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
-use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json};
+use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json, word_enum};
 use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::exr_io::{self, Precision};
@@ -20,27 +19,17 @@ use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
 use crate::views::write_preview;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RendererKind {
+word_enum! {
+    /// In the order of [`RendererKind::ALL`], the first one that has rendered all views of a dataset makes its input
+    /// pictures. The word is also that of the command line, of `render.json`, and of the folder of its pictures.
+    RendererKind, a "renderer":
     /// Blender's Cycles.
-    Blender,
+    Blender = "blender",
     /// MatEval's own path tracer.
-    Builtin,
+    Builtin = "builtin",
 }
 
 impl RendererKind {
-    /// Every renderer. The first one that has rendered all views of a dataset makes its input pictures.
-    pub const ALL: [Self; 2] = [Self::Blender, Self::Builtin];
-
-    /// The renderer's name: on the command line, in `render.json`, and of the folder that holds its pictures.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Blender => "blender",
-            Self::Builtin => "builtin",
-        }
-    }
-
     /// What the renderer is, in one sentence for a help text.
     pub fn summary(self) -> &'static str {
         match self {
@@ -51,29 +40,7 @@ impl RendererKind {
 
     /// The name as a dataset's files hold it.
     pub fn id(self) -> RendererId {
-        RendererId::new(self.name()).expect("every renderer's name is a valid id")
-    }
-}
-
-impl std::fmt::Display for RendererKind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// A name that no renderer has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is not a renderer; expected one of: {}", RendererKind::ALL.map(RendererKind::name).join(", "))]
-pub struct UnknownRenderer {
-    pub name: String,
-}
-
-impl FromStr for RendererKind {
-    type Err = UnknownRenderer;
-
-    fn from_str(name: &str) -> Result<Self, UnknownRenderer> {
-        let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
-        found.ok_or_else(|| UnknownRenderer { name: name.to_owned() })
+        RendererId::new(self.word()).expect("every renderer's word is a valid id")
     }
 }
 
@@ -229,9 +196,9 @@ mod tests {
 
     #[test]
     fn every_name_parses_back_and_is_an_id() {
-        for kind in RendererKind::ALL {
+        for &kind in RendererKind::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
-            assert_eq!(kind.id().as_str(), kind.name());
+            assert_eq!(kind.id().as_str(), kind.word());
         }
         let unknown = "povray".parse::<RendererKind>().unwrap_err();
         assert_eq!(unknown.to_string(), "'povray' is not a renderer; expected one of: blender, builtin");

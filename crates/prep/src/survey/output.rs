@@ -36,7 +36,7 @@ pub(super) fn merge(
         format: SURVEY_FORMAT.to_owned(),
         tool: tool.to_owned(),
         seed: options.seed,
-        camera_rules: options.camera_rules.name().to_owned(),
+        camera_rules: options.camera_rules.to_string(),
         selection: None,
         houses: Vec::new(),
     };

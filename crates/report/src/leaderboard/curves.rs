@@ -73,7 +73,7 @@ pub(super) fn write_perturbed(board: &Board<'_>, site: &SiteWriter<'_>) -> Resul
     if !has_perturbed(board) {
         return Ok(());
     }
-    let sections: Vec<Section> = PerturbationKind::ALL.into_iter().filter_map(|kind| section(board, kind)).collect();
+    let sections: Vec<Section> = PerturbationKind::ALL.iter().filter_map(|kind| section(board, *kind)).collect();
     site.page(&Page {
         file: "perturbed.html",
         template: "perturbed.j2",

@@ -55,7 +55,7 @@ pub struct RenderedWith {
 /// The settings of all pictures, in the order of the renderers and then of the scenes.
 pub(crate) fn rendered_with(dataset: &Dataset) -> Result<Vec<RenderedWith>, ReportError> {
     let mut all: Vec<RenderedWith> = Vec::new();
-    for renderer in RendererKind::ALL.map(RendererKind::id) {
+    for renderer in RendererKind::ALL.iter().map(|kind| kind.id()) {
         for scene in &dataset.scenes {
             for view in &scene.views {
                 if let Some(file) = render_file(dataset, scene, &renderer, &view.id)? {

@@ -1,30 +1,21 @@
 //! The rules that drawn cameras keep, and the named sets of them.
 
-use std::str::FromStr;
+use mateval_dataset::word_enum;
 
-/// A named set of rules for drawn cameras.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CameraRules {
+word_enum! {
+    /// A named set of rules for drawn cameras.
+    #[derive(Default)]
+    CameraRules, a "set of camera rules":
     /// Those of BlenderProc's 3D-FRONT examples. In rooms of later releases, which are open to other rooms and full of
     /// furniture, often no camera keeps them.
     #[default]
-    BlenderProc,
+    BlenderProc = "blenderproc",
     /// Those of the fork of BlenderProc that the paper's lab (3dlg-hcvc) published: no distances, a score of its
     /// own that ignores the architecture, and the best of three times as many cameras.
-    ThreeDlg,
+    ThreeDlg = "3dlg",
 }
 
 impl CameraRules {
-    pub const ALL: [Self; 2] = [Self::BlenderProc, Self::ThreeDlg];
-
-    /// The set's name: on the command line, in recipes and in `survey.json`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::BlenderProc => "blenderproc",
-            Self::ThreeDlg => "3dlg",
-        }
-    }
-
     /// What the set is, in one sentence for a help text.
     pub fn summary(self) -> &'static str {
         match self {
@@ -89,28 +80,6 @@ impl CameraRules {
     }
 }
 
-impl std::fmt::Display for CameraRules {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// A name that no set of rules has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is no set of camera rules; expected one of: {}", CameraRules::ALL.map(CameraRules::name).join(", "))]
-pub struct UnknownCameraRules {
-    pub name: String,
-}
-
-impl FromStr for CameraRules {
-    type Err = UnknownCameraRules;
-
-    fn from_str(name: &str) -> Result<Self, UnknownCameraRules> {
-        let found = Self::ALL.into_iter().find(|rules| rules.name() == name);
-        found.ok_or_else(|| UnknownCameraRules { name: name.to_owned() })
-    }
-}
-
 /// How the variety of what a camera sees enters its score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coverage {
@@ -166,8 +135,8 @@ mod tests {
 
     #[test]
     fn names_read_back_and_others_are_refused() {
-        for rules in CameraRules::ALL {
-            assert_eq!(rules.name().parse(), Ok(rules));
+        for &rules in CameraRules::ALL {
+            assert_eq!(rules.word().parse(), Ok(rules));
         }
         let text = "3DLG".parse::<CameraRules>().unwrap_err().to_string();
         assert!(text.ends_with("expected one of: blenderproc, 3dlg"), "{text}");
