@@ -5,11 +5,11 @@ use std::path::Path;
 
 use mateval_dataset::dataset::{Instance, SceneFile};
 use mateval_dataset::layout::is_rendered;
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside};
 use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, StoredEncoding, SubmissionFile, scene_folder};
 use mateval_dataset::{Progress, Report, json};
 use mateval_files::FileError;
-use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
+use mateval_files::work_folder::{WorkFolder, check_free};
 
 use crate::error::BaselineError;
 
@@ -95,7 +95,7 @@ pub fn write_scenes(
 /// Fails where a submission may not be written to `out`: in the dataset's folder, or where something exists that
 /// `force` does not allow replacing, or that is no submission.
 pub fn check_out(dataset: &Dataset, out: &Path, force: bool) -> Result<(), BaselineError> {
-    check_outside(dataset, out)?;
+    check_outside(out, &dataset.root, "--out")?;
     check_free(out, force, "--out")?;
     if out.exists() && !out.join(SUBMISSION).exists() {
         let why = "exists and holds no submission.json, so it is not replaced; choose another --out";
@@ -106,14 +106,9 @@ pub fn check_out(dataset: &Dataset, out: &Path, force: bool) -> Result<(), Basel
 
 /// Fails where files for another project would replace something or lie in the dataset.
 pub(crate) fn check_new_place(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
-    check_outside(dataset, out)?;
+    check_outside(out, &dataset.root, "--out")?;
     match out.exists() {
         true => Err(BaselineError::unusable(out, "already exists; choose another --out")),
         false => Ok(()),
     }
-}
-
-fn check_outside(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
-    let why = "lies in the dataset, which must hold nothing else; choose another --out";
-    if is_inside(out, &dataset.root) { Err(BaselineError::unusable(out, why)) } else { Ok(()) }
 }

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
-use mateval_dataset::open::{Dataset, enclosing_dataset};
+use mateval_dataset::open::Dataset;
 use mateval_dataset::word_enum::UnknownWord;
 use mateval_submission::SubmissionError;
 use mateval_submission::archive::{self, Opened};
@@ -36,13 +36,6 @@ pub fn open_dataset(root: &Path) -> anyhow::Result<Dataset> {
 /// Opens a submission; an archive is unpacked to a temporary folder, which goes with the value.
 pub fn open_submission(path: &Path) -> Result<Opened, SubmissionError> {
     archive::open(path, &std::env::temp_dir())
-}
-
-/// Fails where `path`, the value of `flag`, would lie in a dataset, whose manifest would not list it.
-pub fn check_outside_datasets(path: &Path, flag: &str) -> anyhow::Result<()> {
-    let Some(dataset) = enclosing_dataset(path) else { return Ok(()) };
-    let (shown, dataset) = (path.display(), dataset.display());
-    bail!("'{shown}' would lie in the dataset '{dataset}', whose manifest does not list it; choose another {flag}")
 }
 
 /// Fails where no file can be written to `path`, the value of `flag`; `kind` names the file in messages.

@@ -16,7 +16,7 @@ use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::median::{self, MedianOf};
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::progress::wrapped;
 use mateval_dataset::{Finding, Severity, json};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
@@ -36,7 +36,6 @@ use mateval_report::tables::{Grouping, TableFormat, headline, tables};
 use serde::{Deserialize, Serialize};
 
 use crate::TOOL;
-use crate::arguments::check_outside_datasets;
 use crate::fetch::{cache_folder, load_weights};
 use crate::prep::make::{BlenderArgs, checked_renderer, renderer_parser, samples_parser};
 use crate::terminal::{Outcome, columns, counted, error_text, print, say, with_progress};

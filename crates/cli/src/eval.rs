@@ -6,7 +6,7 @@ mod show;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
@@ -19,7 +19,7 @@ use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
 use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs};
 use crate::TOOL;
-use crate::arguments::{Format, check_output_file, check_outside_datasets, open_submission};
+use crate::arguments::{Format, check_output_file, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
 use crate::terminal::{Outcome, print, print_fitted, say_findings, with_progress};
 

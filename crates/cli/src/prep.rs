@@ -7,6 +7,7 @@ mod publish;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
+use mateval_dataset::open::check_outside_datasets;
 use mateval_dataset::{SceneId, Severity, json};
 use mateval_files::whole::write_whole;
 use mateval_prep::compare::{CompareOptions, compare, tables};
@@ -16,7 +17,7 @@ use mateval_prep::verify::verify;
 use self::make::{BuildArgs, FinishArgs, PerturbArgs, RenderArgs, SurveyArgs, samples_parser};
 use self::publish::{ExportArgs, PublishArgs};
 use crate::TOOL;
-use crate::arguments::{Format, check_output_file, check_outside_datasets, open_dataset};
+use crate::arguments::{Format, check_output_file, open_dataset};
 use crate::terminal::{Outcome, columns, print, print_fitted, say, with_progress};
 
 /// Subcommands of `prep`.

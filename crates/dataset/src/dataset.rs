@@ -54,6 +54,30 @@ impl DatasetFile {
     pub fn perturbation(&self) -> Option<Perturbation> {
         self.geometry.as_ref().map(|geometry| geometry.perturbation)
     }
+
+    /// What other files name it by.
+    pub fn named(&self) -> DatasetVersion {
+        let Self { name, version, manifest_sha256, .. } = self;
+        DatasetVersion { name: name.clone(), version: version.clone(), manifest_sha256: manifest_sha256.clone() }
+    }
+}
+
+/// The dataset that a file is about.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DatasetVersion {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// SHA-256 of its manifest, in hexadecimal.
+    pub manifest_sha256: String,
+}
+
+impl fmt::Display for DatasetVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}' {} with manifest {}", self.name, self.version, self.manifest_sha256)
+    }
 }
 
 /// A scene's licence text, as it came with its source.

@@ -65,6 +65,16 @@ pub enum SceneError {
     },
     #[error("'{}' has no scene {}; it has {}", dataset.display(), quoted(unknown), quoted(known))]
     UnknownScenes { dataset: PathBuf, unknown: Vec<SceneId>, known: Vec<SceneId> },
+    #[error(
+        "'{}' would lie in the dataset '{}', whose manifest does not list it; choose another {place}",
+        path.display(), dataset.display()
+    )]
+    OutputInDataset {
+        path: PathBuf,
+        dataset: PathBuf,
+        /// The argument that names the output, as in `--out`.
+        place: &'static str,
+    },
     /// Scenes that the dataset lists are needed and their folders are missing: download them.
     #[error(
         "the folders of {} of the {total} scenes that '{}' lists are missing: unpack {} in the dataset's folder",

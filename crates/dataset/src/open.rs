@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_file;
 use mateval_files::whole::is_temporary;
+use mateval_files::work_folder::is_inside;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile, WideView};
+use crate::dataset::{DatasetFile, DatasetVersion, FORMAT, SceneFile, TargetsFile, WideView};
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use crate::{Finding, RendererId, SceneError, SceneId, Severity, SourceKind, ViewId, json, manifest};
 
@@ -132,8 +133,24 @@ fn check_none_absent(root: &Path, file: &DatasetFile, absent: Vec<SceneId>) -> R
     Err(SceneError::AbsentScenes { dataset: root.to_owned(), absent, total: file.scenes.len() })
 }
 
+/// Fails where the output `out`, the value of the argument `place`, would lie in the dataset in `root`.
+pub fn check_outside(out: &Path, root: &Path, place: &'static str) -> Result<(), SceneError> {
+    match is_inside(out, root) {
+        true => Err(SceneError::OutputInDataset { path: out.to_owned(), dataset: root.to_owned(), place }),
+        false => Ok(()),
+    }
+}
+
+/// Fails where the output `out`, the value of the argument `place`, would lie in any dataset.
+pub fn check_outside_datasets(out: &Path, place: &'static str) -> Result<(), SceneError> {
+    match enclosing_dataset(out) {
+        Some(dataset) => Err(SceneError::OutputInDataset { path: out.to_owned(), dataset, place }),
+        None => Ok(()),
+    }
+}
+
 /// The dataset that `path`, which need not exist, would lie in.
-pub fn enclosing_dataset(path: &Path) -> Option<PathBuf> {
+fn enclosing_dataset(path: &Path) -> Option<PathBuf> {
     let path = std::path::absolute(path).ok()?;
     // Of the folders above, some may be yet to be made, and others may be links.
     let above = path.ancestors().skip(1).find_map(|folder| folder.canonicalize().ok())?;
@@ -266,6 +283,12 @@ pub struct DatasetId {
 }
 
 impl DatasetId {
+    /// What other files name it by.
+    pub fn named(&self) -> DatasetVersion {
+        let Self { name, version, manifest_sha256, .. } = self;
+        DatasetVersion { name: name.clone(), version: version.clone(), manifest_sha256: manifest_sha256.clone() }
+    }
+
     /// Describes a dataset of which `scenes` are scored or checked.
     pub fn new<'a>(dataset: &Dataset, scenes: impl IntoIterator<Item = &'a SceneFile>) -> Self {
         let scenes: Vec<&SceneFile> = scenes.into_iter().collect();

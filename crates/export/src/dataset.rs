@@ -70,9 +70,6 @@ pub enum ExportError {
     /// The dataset's pictures were not rendered.
     #[error("'{}' has no pictures of all its views yet; run `mateval prep render DATASET`", path.display())]
     NoPictures { path: PathBuf },
-    /// The output would lie in the dataset.
-    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --out", path.display())]
-    OutputInDataset { path: PathBuf },
     /// The scene has no such view.
     #[error("'{}' has no view '{view}' of the scene '{scene}'", path.display())]
     NoView {

@@ -15,8 +15,9 @@ pub mod tars;
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::open::check_outside;
 use mateval_dataset::{Progress, Report};
-use mateval_files::work_folder::{WorkFolder, is_inside};
+use mateval_files::work_folder::WorkFolder;
 
 pub use dataset::{ExportError, Exported, Format};
 use dataset::{ShownView, SoundDataset, shown_views, write_licence};
@@ -38,9 +39,7 @@ pub fn export(options: &ExportOptions, progress: Progress<'_>) -> Result<Exporte
     if options.out.exists() {
         return Err(ExportError::Exists { path: options.out.clone() });
     }
-    if is_inside(&options.out, &options.dataset) {
-        return Err(ExportError::OutputInDataset { path: options.out.clone() });
-    }
+    check_outside(&options.out, &options.dataset, "--out")?;
     let sound = SoundDataset::open(&options.dataset, options.format, progress)?;
     let work = WorkFolder::start(&options.out)?;
     let exported = match options.format {

@@ -515,7 +515,7 @@ fn names_that_lead_out_of_the_dataset() {
 fn outputs_that_exist_or_lie_in_the_dataset() {
     let folder = copy();
     let inside = options(folder.path(), Format::Tar, folder.path().join("scenes/out"));
-    assert!(matches!(export(&inside, &|_| ()), Err(ExportError::OutputInDataset { .. })));
+    assert!(matches!(export(&inside, &|_| ()), Err(ExportError::Dataset(SceneError::OutputInDataset { .. }))));
     let place = tempfile::tempdir().unwrap();
     let taken = options(folder.path(), Format::Tar, place.path().to_owned());
     let text = export(&taken, &|_| ()).unwrap_err().to_string();

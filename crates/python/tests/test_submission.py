@@ -248,7 +248,7 @@ def test_a_submission_replaces_nothing_unasked(root, dataset, scene, tmp_path, c
     assert said == f"error: {caught.value}\n"
     mateval.Submission(out, dataset, method="third", force=True).close()
     assert json.loads((out / "submission.json").read_text())["method"] == "third"
-    with pytest.raises(mateval.Error, match="lies in the dataset"):
+    with pytest.raises(mateval.Error, match="would lie in the dataset"):
         mateval.Submission(root / "out", dataset, method="m")
     with pytest.raises(ValueError, match="cost: expected 'seconds_a_scene', found no such key"):
         mateval.Submission(tmp_path / "other", dataset, method="m", cost={})

@@ -4,6 +4,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use mateval_dataset::dataset::DatasetVersion;
 use mateval_dataset::{Finding, SceneId};
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
@@ -41,9 +42,6 @@ pub enum ReportError {
     /// A folder that is not the report of a release would be replaced: choose another one.
     #[error("'{}' exists and is not the report of a release; choose another --report", path.display())]
     NotAReport { path: PathBuf },
-    /// The report would lie in the dataset: choose another place.
-    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --report", path.display())]
-    OutputInDataset { path: PathBuf },
     /// The dataset has no ground truth that could be withheld.
     #[error("'{}' has no ground truth to withhold", path.display())]
     NoGroundTruth { path: PathBuf },
@@ -153,25 +151,11 @@ pub enum Mismatch {
     Score { key: ResultKey, scene: SceneId, expected: Option<f64>, found: f64 },
 }
 
-/// A dataset, as a result names it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DatasetVersion {
-    pub name: String,
-    pub version: String,
-    pub manifest_sha256: String,
-}
-
 /// A submission, as a result names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubmissionVersion {
     pub method: String,
     pub sha256: String,
-}
-
-impl fmt::Display for DatasetVersion {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "'{}' {} with manifest {}", self.name, self.version, self.manifest_sha256)
-    }
 }
 
 impl fmt::Display for SubmissionVersion {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::builder::PossibleValue;
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{SceneId, json};
 use mateval_eval::metric::PictureKind;
 use mateval_eval::protocol::Track;
@@ -18,7 +18,7 @@ use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_submission::archive::Opened;
 
 use crate::TOOL;
-use crate::arguments::{Format, check_outside_datasets, open_submission};
+use crate::arguments::{Format, open_submission};
 use crate::terminal::{Outcome, columns, print, say, with_progress};
 
 #[derive(clap::Args)]

@@ -7,6 +7,7 @@ use anyhow::{Context as _, bail};
 use clap::builder::TypedValueParser;
 use mateval_dataset::SceneId;
 use mateval_dataset::dataset::PerturbationKind;
+use mateval_dataset::open::check_outside_datasets;
 use mateval_eval::light::reference::{RELEASE_SAMPLES, ReferenceOptions, make_references};
 use mateval_files::work_folder::check_free;
 use mateval_prep::build::BuildOptions;
@@ -21,7 +22,7 @@ use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, s
 use mateval_sources::front3d::camera_rules::CameraRules;
 
 use crate::TOOL;
-use crate::arguments::{check_outside_datasets, word_parser};
+use crate::arguments::word_parser;
 use crate::fetch::{cache_folder, check_blender};
 use crate::terminal::{Outcome, counted, print, say, say_findings, with_progress};
 

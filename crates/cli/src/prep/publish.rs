@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{Finding, SceneId, Severity, ViewId};
 use mateval_export::mitsuba::export_view;
 use mateval_export::{ExportOptions, Exported, Format, croissant, export};
@@ -14,7 +14,6 @@ use mateval_report::release::file::Day;
 use mateval_report::release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
 
 use crate::TOOL;
-use crate::arguments::check_outside_datasets;
 use crate::prep::make::samples_parser;
 use crate::terminal::{Outcome, counted, print, say, with_progress};
 

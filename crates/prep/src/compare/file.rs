@@ -1,6 +1,7 @@
 //! `compare.json`: how far two renderers' pictures of a dataset agree; the kinds of material by how far two renderers
 //! may differ on them; and the bounds, with the reason of each.
 
+use mateval_dataset::dataset::DatasetVersion;
 use mateval_dataset::material::MaterialModel;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{SceneId, ViewId};
@@ -19,7 +20,7 @@ pub struct CompareFile {
     /// The program that compared and its version, as in `mateval 0.1.0`.
     pub tool: String,
     /// The dataset that was compared.
-    pub dataset: ComparedDataset,
+    pub dataset: DatasetVersion,
     /// The renderer whose pictures are compared with the built-in tracer's: `blender`.
     pub renderer: String,
     /// The bounds that decide whether a check agrees.
@@ -28,18 +29,6 @@ pub struct CompareFile {
     pub agrees: bool,
     /// The scenes, in the dataset's order.
     pub scenes: Vec<SceneComparison>,
-}
-
-/// The dataset that was compared.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ComparedDataset {
-    /// Its name.
-    pub name: String,
-    /// Its version.
-    pub version: String,
-    /// SHA-256 of its manifest, in hexadecimal.
-    pub manifest_sha256: String,
 }
 
 /// One scene.

@@ -23,19 +23,19 @@ use std::sync::Arc;
 use crate::render::RendererKind;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{BuildFolder, COMPARE, SceneFolder};
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside};
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::render_file::RENDER_FILE;
 use mateval_dataset::verdict::{CompareCounts, VERDICT_FORMAT, VerdictFile};
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
-use mateval_files::work_folder::{WorkFolder, check_free, is_inside};
+use mateval_files::work_folder::{WorkFolder, check_free};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Psnr;
 use mateval_tracer::World;
 
 use self::file::{
-    BOUNDS, COMPARE_FORMAT, CompareFile, ComparedDataset, LAMBERT_TILE, LightComparison, MaterialKind, OTHER_TILE,
-    SceneComparison, SourceComparison, State, ViewComparison, file_check,
+    BOUNDS, COMPARE_FORMAT, CompareFile, LAMBERT_TILE, LightComparison, MaterialKind, OTHER_TILE, SceneComparison,
+    SourceComparison, State, ViewComparison, file_check,
 };
 use self::geometry::{OurGeometry, TheirGeometry};
 use self::light::ShownKinds;
@@ -81,11 +81,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     let mut file = CompareFile {
         format: COMPARE_FORMAT.to_owned(),
         tool: tool.to_owned(),
-        dataset: ComparedDataset {
-            name: dataset.file.name.clone(),
-            version: dataset.file.version.clone(),
-            manifest_sha256: dataset.file.manifest_sha256.clone(),
-        },
+        dataset: dataset.file.named(),
         renderer: COMPARED.to_string(),
         bounds: BOUNDS,
         agrees: true,
@@ -153,12 +149,7 @@ fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), PrepEr
 /// Fails where the output would lie in the dataset, or exists and may not be replaced.
 fn check_out(options: &CompareOptions) -> Result<(), PrepError> {
     let Some(out) = &options.out else { return Ok(()) };
-    if is_inside(out, &options.dataset) {
-        return Err(PrepError::unusable(
-            out,
-            "would lie in the dataset, whose manifest does not list it; choose another --out",
-        ));
-    }
+    check_outside(out, &options.dataset, "--out")?;
     if !out.exists() {
         return Ok(());
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::ViewId;
-use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::dataset::{DatasetVersion, SceneFile};
 use mateval_files::{FileError, untrusted};
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_image::transfer::byte_from_unit;
@@ -13,7 +13,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::file::{CompareFile, ComparedDataset, LightComparison, SourceComparison, State};
+use super::file::{CompareFile, LightComparison, SourceComparison, State};
 use super::geometry::{OurGeometry, TheirGeometry, angle_deg, away_from_edges};
 use super::light::ShownKinds;
 use super::tables::{faults, verdict};
@@ -47,7 +47,7 @@ pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String
             }
         })
         .collect();
-    let ComparedDataset { name, version, .. } = &file.dataset;
+    let DatasetVersion { name, version, .. } = &file.dataset;
     let values = context! {
         title => format!("{name} {version}: {} compared with MatEval", file.renderer),
         tool => &file.tool, renderer => &file.renderer, dataset => Serde(&file.dataset), agrees => file.agrees,

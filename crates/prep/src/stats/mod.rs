@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_dataset::dataset::SUPER_CATEGORIES;
-use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::dataset::{DatasetVersion, Instance, SceneFile};
 use mateval_dataset::layout::DATASET;
 use mateval_dataset::material::MaterialParameter;
 use mateval_dataset::open::Dataset;
@@ -31,7 +31,7 @@ pub struct StatsFile {
     /// The program that counted and its version, as in `mateval 0.1.0`.
     pub tool: String,
     /// The dataset that was counted.
-    pub dataset: CountedDataset,
+    pub dataset: DatasetVersion,
     /// Number of scenes ("Number of scenes" of Table I).
     pub scenes: usize,
     /// Number of different houses. Scenes of one house are not independent of each other.
@@ -50,18 +50,6 @@ pub struct StatsFile {
     pub total: Counts,
     /// Counts of each scene, in the dataset's order.
     pub per_scene: Vec<SceneStats>,
-}
-
-/// The dataset that was counted.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CountedDataset {
-    /// Its name.
-    pub name: String,
-    /// Its version.
-    pub version: String,
-    /// SHA-256 of its manifest, in hexadecimal.
-    pub manifest_sha256: String,
 }
 
 /// The number of scenes from one kind of source.
@@ -177,11 +165,7 @@ pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, PrepError> {
     Ok(StatsFile {
         format: STATS_FORMAT.to_owned(),
         tool: tool.to_owned(),
-        dataset: CountedDataset {
-            name: dataset.file.name.clone(),
-            version: dataset.file.version.clone(),
-            manifest_sha256: dataset.file.manifest_sha256.clone(),
-        },
+        dataset: dataset.file.named(),
         scenes: scenes.len(),
         houses: scenes.iter().map(|scene| &scene.source.house).collect::<BTreeSet<_>>().len(),
         source_kinds: tally(scenes.iter().map(|scene| scene.source.kind))

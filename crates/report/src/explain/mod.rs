@@ -36,7 +36,7 @@ use rayon::prelude::*;
 use self::file::{AlignedBy, EXPLAIN_FORMAT, ExplainFile, InstanceExplanation, ViewShift};
 use self::kinds::{Explained, Patch, Shift, explained, patch_error, patches};
 use self::scores::WORST;
-use crate::error::{DatasetVersion, Mismatch, ReportError, SubmissionVersion};
+use crate::error::{Mismatch, ReportError, SubmissionVersion};
 use crate::strips::{GAP_COLOR, SCALE_ROWS, error_color, grid, scale};
 
 /// The page that links the pictures.
@@ -222,19 +222,10 @@ fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, ReportError> 
 }
 
 fn other_dataset(plan: &ExplainPlan<'_>) -> Mismatch {
-    let (expected, found) = (&plan.result.dataset, &plan.dataset.file);
     Mismatch::Dataset {
-        expected: DatasetVersion {
-            name: expected.name.clone(),
-            version: expected.version.clone(),
-            manifest_sha256: expected.manifest_sha256.clone(),
-        },
+        expected: plan.result.dataset.named(),
         path: plan.dataset.root.clone(),
-        found: DatasetVersion {
-            name: found.name.clone(),
-            version: found.version.clone(),
-            manifest_sha256: found.manifest_sha256.clone(),
-        },
+        found: plan.dataset.file.named(),
     }
 }
 

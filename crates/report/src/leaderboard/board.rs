@@ -2,14 +2,13 @@
 
 use mateval_dataset::SceneId;
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::open::DatasetId;
 use mateval_eval::metric::PictureKind;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use serde::Serialize;
 
 use super::columns::{self, Column, MethodHead, standing};
 use super::entries::{LeaderboardPlan, Verified};
-use super::file::{Ceiling, LEADERBOARD_FORMAT, LeaderboardDataset, LeaderboardFile, LeaderboardMethod};
+use super::file::{Ceiling, LEADERBOARD_FORMAT, LeaderboardFile, LeaderboardMethod};
 use super::pictures::{ERROR, PictureSet, TRUTH, png_size};
 use super::rooms::{Room, Rooms};
 use super::site::SiteWriter;
@@ -51,13 +50,7 @@ impl<'a> Board<'a> {
         };
         let methods: Vec<_> = ranking.methods.iter().zip(plan.results).zip(&plan.verified).map(method).collect();
         // The ranking has refused an empty list.
-        let dataset = plan.results.first().map(|result| &result.dataset);
-        let text = |of: fn(&DatasetId) -> &String| dataset.map(of).cloned().unwrap_or_default();
-        let dataset = LeaderboardDataset {
-            name: text(|dataset| &dataset.name),
-            version: text(|dataset| &dataset.version),
-            manifest_sha256: text(|dataset| &dataset.manifest_sha256),
-        };
+        let dataset = plan.results.first().map(|result| result.dataset.named()).unwrap_or_default();
         let heads = ranking.methods.iter().zip(&methods).zip(plan.results);
         let heads = heads.map(|((ranked, method), result)| MethodHead::new(ranked, method, result, &ranking));
         Self {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::dataset::DatasetVersion;
 use mateval_dataset::submission::Cost;
 use mateval_eval::result::key::ResultKey;
 use schemars::JsonSchema;
@@ -25,7 +26,7 @@ pub struct LeaderboardFile {
     /// The tool that wrote it, as in `mateval 0.1.0`.
     pub tool: String,
     /// The dataset that all submissions were scored on.
-    pub dataset: LeaderboardDataset,
+    pub dataset: DatasetVersion,
     /// The scores of the truth itself, which no method is expected to exceed; they are not ranked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ceiling: Option<Ceiling>,
@@ -33,18 +34,6 @@ pub struct LeaderboardFile {
     pub methods: Vec<LeaderboardMethod>,
     /// Scores, intervals and ranks.
     pub ranking: Ranking,
-}
-
-/// The dataset that all submissions were scored on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LeaderboardDataset {
-    /// Its name.
-    pub name: String,
-    /// Its version.
-    pub version: String,
-    /// SHA-256 of its manifest, hex.
-    pub manifest_sha256: String,
 }
 
 /// The scores of the truth itself.

@@ -11,8 +11,9 @@ use serde_json::Value;
 
 use super::board::Board;
 use super::entries::ErrataFile;
-use super::file::LeaderboardDataset;
 use super::site::{Page, SiteWriter};
+use mateval_dataset::dataset::DatasetVersion;
+
 use crate::error::ReportError;
 use crate::ranking::file::{IntervalKind, RankingRules};
 
@@ -41,7 +42,7 @@ pub(super) fn write(board: &Board<'_>, errata: Option<&ErrataFile>, site: &SiteW
 
 #[derive(Serialize)]
 struct ProtocolPage<'a> {
-    dataset: &'a LeaderboardDataset,
+    dataset: &'a DatasetVersion,
     weights: Option<&'a String>,
     protocol_sha256: String,
     rules: Vec<(String, String)>,

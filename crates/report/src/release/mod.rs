@@ -24,10 +24,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::open::Dataset;
+use mateval_dataset::open::{Dataset, check_outside};
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
 use mateval_files::whole::write_whole;
-use mateval_files::work_folder::{WorkFolder, check_free, check_holds_none, is_inside};
+use mateval_files::work_folder::{WorkFolder, check_free, check_holds_none};
 use mateval_prep::{stats, verify};
 
 pub use file::{Publication, ReleaseFile};
@@ -171,9 +171,7 @@ impl<'a> CheckedRelease<'a> {
 /// Fails where the report would lie in the dataset, replace an input, or replace anything but a report.
 fn check_place(options: &ReleaseOptions) -> Result<(), ReportError> {
     let out = &options.out;
-    if is_inside(out, &options.dataset) {
-        return Err(ReportError::OutputInDataset { path: out.clone() });
-    }
+    check_outside(out, &options.dataset, "--report")?;
     let files = options.verdicts.iter().chain(&options.ceiling).chain(&options.floor);
     let inputs: Vec<&Path> = std::iter::once(&options.dataset).chain(files).map(PathBuf::as_path).collect();
     check_holds_none(out, &inputs)?;

@@ -228,11 +228,12 @@ fn without_bound(name: &str, method: &str, scores: Option<&ReferenceScores>, all
 mod tests {
     use std::collections::BTreeMap;
 
+    use mateval_dataset::dataset::DatasetVersion;
     use mateval_dataset::scene_cost::{Step, StepCost};
     use mateval_dataset::{SceneId, SourceKind, ViewId};
     use mateval_eval::result::key::ResultKey;
     use mateval_prep::compare::file::State;
-    use mateval_prep::stats::{CountedDataset, Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
+    use mateval_prep::stats::{Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
 
     use super::super::file::{
         NOT_SHOWN, Publication, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, withhold,
@@ -266,7 +267,7 @@ mod tests {
             stats: StatsFile {
                 format: STATS_FORMAT.to_owned(),
                 tool: "mateval 0".to_owned(),
-                dataset: CountedDataset {
+                dataset: DatasetVersion {
                     name: "made-up".to_owned(),
                     version: "1.0".to_owned(),
                     manifest_sha256: String::new(),
