@@ -1,9 +1,9 @@
 //! Compares the meshes of a finished scene, one for each instance and each part, with its `scene.json`.
 
-use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::dataset::{Part, SceneFile};
 use mateval_dataset::glb::{self, GlbNode};
-use mateval_dataset::layout::{SceneFolder, parts_file};
-use mateval_dataset::{Finding, Severity};
+use mateval_dataset::layout::{SceneFolder, part_picture, parts_file};
+use mateval_dataset::{Finding, PartSetId, Severity};
 
 use crate::error::PrepError;
 
@@ -14,6 +14,17 @@ pub struct Meshes {
     pub instances: Vec<GlbNode>,
     /// For every set of parts and every instance: the part of each triangle, as an index in the set.
     pub part_sets: Vec<Vec<Vec<usize>>>,
+}
+
+impl Meshes {
+    /// For each set of parts its picture's file, and the part's value in it for every triangle of every instance.
+    pub fn part_values(&self, scene: &SceneFile) -> Vec<(String, Vec<Vec<u16>>)> {
+        let values = |((set, parts), of_triangles): ((Option<&PartSetId>, &[Part]), &Vec<Vec<usize>>)| {
+            let value = |part: &usize| parts[*part].index.0.get();
+            (part_picture(set), of_triangles.iter().map(|instance| instance.iter().map(value).collect()).collect())
+        };
+        scene.all_part_sets().zip(&self.part_sets).map(values).collect()
+    }
 }
 
 /// Reads the meshes and compares them with `scene.json`. Returns none where they differ, since nothing else can then be
@@ -120,8 +131,7 @@ pub fn part_values(folder: &SceneFolder, scene: &SceneFile) -> Result<Vec<Vec<u1
         let path = folder.path().to_owned();
         return Err(mateval_dataset::SceneError::Invalid { path, findings: faults.all }.into());
     };
-    let value = |part: &usize| scene.parts[*part].index.0.get();
-    Ok(meshes.part_sets[0].iter().map(|of_triangles| of_triangles.iter().map(value).collect()).collect())
+    Ok(meshes.part_values(scene).swap_remove(0).1)
 }
 
 /// Faults of a dataset, collected so that all of them are reported together.

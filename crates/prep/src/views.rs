@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use glam::DVec2;
+use mateval_dataset::dataset::View;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::material::Appearance;
 use mateval_dataset::reference::{Emission, ReferenceScene, SurfaceIndex};
 use mateval_dataset::{Camera, ViewId};
+use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, png_io};
 use mateval_tracer::World;
@@ -239,8 +241,43 @@ pub(crate) fn write_preview(folder: &Path, radiance: &Picture<LinearRgb>, exposu
     Ok(png_io::write_srgb(&folder.join("rgb.png"), &exposed.to_srgb())?)
 }
 
+/// What the pictures of all views show.
+pub(crate) struct Shown {
+    /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
+    pub(crate) nearest: Vec<Option<f64>>,
+    /// The share of the valid pixels of each view that the input view does not show.
+    pub(crate) unseen_shares: Vec<f64>,
+}
+
+/// Makes the pictures of every view, the input view first, and writes those of geometry. `parts` holds for each set of
+/// parts the name of its picture and its value for every triangle of every instance. `each` is called with the number of
+/// the view and its pictures.
+pub(crate) fn write_views(
+    folder: &SceneFolder,
+    scene: &ViewScene<'_>,
+    views: &[View],
+    parts: &[(String, Vec<Vec<u16>>)],
+    mut each: impl FnMut(usize, &GeometryPictures, &TruthPictures) -> Result<(), PrepError>,
+) -> Result<Shown, PrepError> {
+    let mut nearest = [vec![None; scene.instances.len()], vec![None; scene.instances.len()]];
+    let mut unseen_shares = Vec::new();
+    for (at, view) in views.iter().enumerate() {
+        let (geometry, truth) = scene.pictures(&view.camera, &views[0].camera);
+        note_nearest(&geometry, &mut nearest[usize::from(at > 0)]);
+        unseen_shares.push(unseen_share(&geometry));
+        let shown = folder.view(&view.id);
+        std::fs::create_dir_all(&shown).map_err(FileError::io("make", &shown))?;
+        write_geometry(&shown, &view.id, &geometry)?;
+        write_parts(&shown, &geometry, parts)?;
+        each(at, &geometry, &truth)?;
+    }
+    let [input, others] = nearest;
+    let nearest = input.into_iter().zip(others).map(|(first, other)| first.or(other)).collect();
+    Ok(Shown { nearest, unseen_shares })
+}
+
 /// Lowers the nearest depth of every instance that the view shows.
-pub(crate) fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
+fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
     for (instance, depth) in geometry.instance.pixels().iter().zip(geometry.depth.pixels()) {
         if let Some(place) = usize::from(*instance).checked_sub(1) {
             let depth = f64::from(*depth);
@@ -250,19 +287,14 @@ pub(crate) fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f6
 }
 
 /// The share of the valid pixels that the input view does not show.
-pub(crate) fn unseen_share(geometry: &GeometryPictures) -> f64 {
+fn unseen_share(geometry: &GeometryPictures) -> f64 {
     let count = |mask: &Mask| mask.pixels().iter().filter(|&&holds| holds).count() as f64;
     // No valid pixel, none unseen.
     count(&geometry.unobserved) / count(&geometry.valid).max(1.0)
 }
 
 /// Writes the pictures of geometry that methods see, except those of parts.
-pub(crate) fn write_geometry(
-    folder: &SceneFolder,
-    view: &ViewId,
-    geometry: &GeometryPictures,
-) -> Result<(), PrepError> {
-    let shown = folder.view(view);
+fn write_geometry(shown: &Path, view: &ViewId, geometry: &GeometryPictures) -> Result<(), PrepError> {
     exr_io::write_scalar(&shown.join("depth.exr"), &geometry.depth, Precision::Float)?;
     exr_io::write_normal(&shown.join("normal.exr"), &geometry.normal, Precision::Half)?;
     png_io::write_ids(&shown.join("instance.png"), &geometry.instance)?;
@@ -274,11 +306,7 @@ pub(crate) fn write_geometry(
 }
 
 /// Writes the picture of each set of parts. `parts` holds the name of its file and its value for every triangle.
-pub(crate) fn write_parts(
-    shown: &Path,
-    geometry: &GeometryPictures,
-    parts: &[(String, Vec<Vec<u16>>)],
-) -> Result<(), PrepError> {
+fn write_parts(shown: &Path, geometry: &GeometryPictures, parts: &[(String, Vec<Vec<u16>>)]) -> Result<(), PrepError> {
     for (file, values) in parts {
         let picture = geometry.triangle.map(|seen| SeenTriangle::value_in(seen, values));
         png_io::write_ids(&shown.join(file), &picture)?;

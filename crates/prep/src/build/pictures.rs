@@ -9,12 +9,9 @@ use mateval_tracer::World;
 use super::fault::{SceneFault, above_notes};
 use super::plan::Plan;
 use crate::error::PrepError;
-use crate::views::{
-    GeometryPictures, TruthPictures, ViewScene, note_nearest, unseen_share, write_geometry, write_parts,
-};
+use crate::views::{GeometryPictures, Shown, TruthPictures, ViewScene, write_views};
 
 /// What the pictures of all views show.
-#[derive(Default)]
 pub(super) struct Seen {
     /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
     pub(super) nearest: Vec<Option<f64>>,
@@ -52,31 +49,26 @@ pub(super) fn write_pictures(
     let parts: Vec<(String, Vec<Vec<u16>>)> =
         plan.part_splits.iter().map(|split| (part_picture(split.id.as_ref()), split.values())).collect();
     let scene = ViewScene::new(&plan.scene, &world, &instances, scored);
-    let mut seen = Seen::default();
-    let mut in_input = vec![None; plan.instances.len()];
-    let mut elsewhere = vec![None; plan.instances.len()];
-    for (at, view) in plan.views.iter().enumerate() {
-        progress(Report::step("views", at, plan.views.len()));
-        let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
-        note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
-        check_use(plan, &view.id, &geometry, &mut seen);
+    let views = plan.views.len();
+    progress(Report::step("views", 0, views));
+    let (mut findings, mut input_pixels) = (Vec::new(), Vec::new());
+    let Shown { nearest, unseen_shares } = write_views(folder, &scene, &plan.views, &parts, |at, geometry, truth| {
+        let view = &plan.views[at].id;
+        check_use(plan, view, geometry, &mut findings);
         if at == 0 {
-            seen.input_pixels = valid_pixels(&geometry, plan.instances.len());
+            input_pixels = valid_pixels(geometry, plan.instances.len());
         }
-        seen.unseen_shares.push(unseen_share(&geometry));
-        write_geometry(folder, &view.id, &geometry)?;
-        write_truth(folder, &view.id, &truth)?;
-        write_parts(&folder.view(&view.id), &geometry, &parts)?;
-    }
-    progress(Report::step("views", plan.views.len(), plan.views.len()));
-    seen.nearest = in_input.into_iter().zip(elsewhere).map(|(first, other)| first.or(other)).collect();
-    Ok(seen)
+        write_truth(folder, view, truth)?;
+        progress(Report::step("views", at + 1, views));
+        Ok(())
+    })?;
+    Ok(Seen { nearest, unseen_shares, input_pixels, findings })
 }
 
 /// Adds a finding where a view is of little use: no pixel is valid, or a surface is too near to the camera.
-fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut Seen) {
+fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, findings: &mut Vec<Finding>) {
     let mut warn = |code: &str, message: String, action: &str| {
-        seen.findings.push(Finding::new(
+        findings.push(Finding::new(
             Severity::Warning,
             code,
             plan.file.clone(),

@@ -7,14 +7,13 @@
 
 mod motion;
 
-use std::num::NonZeroU16;
 use std::path::Path;
 use std::sync::Arc;
 
 use mateval_dataset::dataset::{DatasetFile, Instance, SceneFile};
 use mateval_dataset::dataset::{Perturbation, PerturbationKind, PerturbedGeometry};
 use mateval_dataset::glb::{self, GlbNode};
-use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, part_picture};
+use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
@@ -24,7 +23,7 @@ use mateval_tracer::World;
 
 use crate::error::PrepError;
 use crate::scene_meshes::{self, Faults, Meshes};
-use crate::views::{ViewScene, note_nearest, unseen_share, write_geometry, write_parts};
+use crate::views::{Shown, ViewScene, write_views};
 use motion::{Amount, Motion, amounts, crossing};
 
 /// What to do with the furniture of a dataset.
@@ -210,14 +209,6 @@ fn new_crossings(
     Ok(all.filter(|((_, before), now)| *now && !before).map(|((piece, _), _)| piece.id.clone()).collect())
 }
 
-/// What the pictures of all views show.
-struct Shown {
-    /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
-    nearest: Vec<Option<f64>>,
-    /// The share of the valid pixels of each view that the input view does not show.
-    unseen_shares: Vec<f64>,
-}
-
 /// Writes the pictures of geometry of every view.
 fn write_pictures(
     to: &SceneFolder,
@@ -229,29 +220,8 @@ fn write_pictures(
     let world = World::new(reference.clone())?;
     let instances: Vec<u16> = scene.instances.iter().map(|instance| instance.index.0.get()).collect();
     let scored: Vec<bool> = scene.instances.iter().map(|instance| instance.atlas.is_some()).collect();
-    let parts: Vec<(String, Vec<Vec<u16>>)> = scene
-        .all_part_sets()
-        .zip(&meshes.part_sets)
-        .map(|((set, parts), of_triangles)| {
-            let value = |part: &usize| NonZeroU16::get(parts[*part].index.0);
-            (part_picture(set), of_triangles.iter().map(|of| of.iter().map(value).collect()).collect())
-        })
-        .collect();
     let view_scene = ViewScene::new(&reference, &world, &instances, &scored);
-    let mut nearest = [vec![None; instances.len()], vec![None; instances.len()]];
-    let mut unseen_shares = Vec::new();
-    for (at, view) in scene.views.iter().enumerate() {
-        let (geometry, _) = view_scene.pictures(&view.camera, &scene.views[0].camera);
-        note_nearest(&geometry, &mut nearest[usize::from(at > 0)]);
-        unseen_shares.push(unseen_share(&geometry));
-        let shown = to.view(&view.id);
-        std::fs::create_dir_all(&shown).map_err(FileError::io("make", &shown))?;
-        write_geometry(to, &view.id, &geometry)?;
-        write_parts(&shown, &geometry, &parts)?;
-    }
-    let [input, others] = nearest;
-    let nearest = input.into_iter().zip(others).map(|(first, other)| first.or(other)).collect();
-    Ok(Shown { nearest, unseen_shares })
+    write_views(to, &view_scene, &scene.views, &meshes.part_values(scene), |_, _, _| Ok(()))
 }
 
 /// `scene.json` with the numbers that follow from the geometry: the lengths of texels and of half a pixel of the input

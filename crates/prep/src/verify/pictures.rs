@@ -35,7 +35,7 @@ struct ViewPictures {
 /// Checks the pictures of every view of the scene.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, meshes: &Meshes, world: &World, faults: &mut Faults) {
     let instances: Vec<u16> = scene.instances.iter().map(|instance| instance.index.0.get()).collect();
-    let parts = part_sets(scene, meshes);
+    let parts = meshes.part_values(scene);
     let scored: Vec<bool> = scene.instances.iter().map(|instance| instance.atlas.is_some()).collect();
     let retraced = ViewScene::new(world.scene(), world, &instances, &scored);
     for view in &scene.views {
@@ -217,16 +217,6 @@ struct Expected<'a> {
     scene: &'a ViewScene<'a>,
     /// For each set of parts its file, and the part's value for every triangle of every instance.
     parts: &'a [(String, Vec<Vec<u16>>)],
-}
-
-fn part_sets(scene: &SceneFile, meshes: &Meshes) -> Vec<(String, Vec<Vec<u16>>)> {
-    let mut sets = Vec::new();
-    for ((set, parts), of_triangles) in scene.all_part_sets().zip(&meshes.part_sets) {
-        let value = |part: &usize| parts[*part].index.0.get();
-        let values = of_triangles.iter().map(|instance| instance.iter().map(value).collect());
-        sets.push((part_picture(set), values.collect()));
-    }
-    sets
 }
 
 /// The pictures that are traced again, except those of parts: first those of geometry, then those of the ground truth.
