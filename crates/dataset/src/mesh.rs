@@ -20,6 +20,14 @@ impl TriangleMesh {
         self.triangles[index].map(|vertex| self.positions[vertex as usize])
     }
 
+    /// The uv at a place of triangle `index` with these barycentric weights; absent without uvs.
+    #[inline]
+    pub fn uv_at(&self, index: usize, weights: Vec3) -> Option<Vec2> {
+        let uvs = self.uvs.as_deref()?;
+        let [a, b, c] = self.triangles[index].map(|vertex| uvs[vertex as usize]);
+        Some(a * weights.x + b * weights.y + c * weights.z)
+    }
+
     /// The unit normal of triangle `index`, on the side where it is counter-clockwise; zero for a triangle without
     /// area.
     pub fn geometric_normal(&self, index: usize) -> DVec3 {

@@ -2,10 +2,11 @@
 //! or does not match the dataset or the submission that it names.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::DatasetVersion;
-use mateval_dataset::{Finding, SceneId};
+use mateval_dataset::{Finding, SceneError, SceneId, Severity};
+use mateval_eval::EvalError;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
@@ -149,6 +150,39 @@ pub enum Mismatch {
         expected.map_or("missing".to_owned(), |expected| expected.to_string())
     )]
     Score { key: ResultKey, scene: SceneId, expected: Option<f64>, found: f64 },
+}
+
+/// What was read from the file at `path`. A file that is not what was `expected` is a finding, with `action` as what to
+/// do; any other failure ends the reading.
+pub(crate) fn fitting<T>(
+    read: Result<T, impl Into<ReportError>>,
+    expected: &str,
+    path: &Path,
+    action: &str,
+    findings: &mut Vec<Finding>,
+) -> Result<Option<T>, ReportError> {
+    let (place, message) = match read.map_err(Into::into) {
+        Ok(value) => return Ok(Some(value)),
+        Err(ReportError::Dataset(error) | ReportError::Eval(EvalError::Dataset(error))) => match error {
+            SceneError::Format { found, expected: format, .. } => (
+                "/format".to_owned(),
+                format!("expected {expected}, found: the format '{found}' in place of '{format}'"),
+            ),
+            SceneError::Invalid { findings: faults, .. } => {
+                let (place, found) =
+                    faults.into_iter().next().map(|fault| (fault.place, fault.message)).unwrap_or_default();
+                (place, format!("expected {expected}, found: {found}"))
+            }
+            other => return Err(other.into()),
+        },
+        Err(ReportError::Eval(EvalError::Contradiction { place, said, found, .. })) => {
+            (place, format!("it states {said}, but its own numbers give {found}"))
+        }
+        Err(other) => return Err(other),
+    };
+    let file = path.display().to_string();
+    findings.push(Finding::new(Severity::Error, "unfit_file", file, place, message, action));
+    Ok(None)
 }
 
 /// A submission, as a result names it.

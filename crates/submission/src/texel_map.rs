@@ -1,6 +1,6 @@
 //! The texels of an instance's atlas on its surface: the area of each, and whether the input camera sees it.
 
-use glam::{DVec2, DVec3, Vec2};
+use glam::{DVec2, DVec3};
 use mateval_dataset::camera::Projection;
 use mateval_dataset::material::CUT_OUT_BELOW_OPACITY;
 use mateval_dataset::reference::SurfaceIndex;
@@ -204,12 +204,7 @@ impl Observer<'_> {
 
     fn opacity(&self, triangle: usize, weights: DVec3) -> f32 {
         let Some(opacity) = &self.world.material_of(self.surface).opacity else { return 1.0 };
-        let weights = weights.as_vec3();
-        let uv = self.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| {
-            let [a, b, c] = self.mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
-            a * weights.x + b * weights.y + c * weights.z
-        });
-        opacity.at(self.world.textures(), uv)
+        opacity.at(self.world.textures(), self.mesh.uv_at(triangle, weights.as_vec3()).unwrap_or_default())
     }
 
     /// Whether the first hit towards a place is that place, or nothing nearer by more than rounding.
@@ -229,7 +224,7 @@ impl Observer<'_> {
 mod tests {
     use std::sync::Arc;
 
-    use glam::Vec3;
+    use glam::{Vec2, Vec3};
     use mateval_dataset::Intrinsics;
     use mateval_dataset::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
     use mateval_dataset::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};

@@ -1,6 +1,6 @@
 //! First hits at points of a picture, for the pictures that show no light: depth, normals, ids, materials.
 
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use mateval_dataset::Camera;
 use mateval_dataset::material::Appearance;
 use mateval_dataset::reference::SurfaceIndex;
@@ -77,10 +77,7 @@ impl<const N: usize> PixelMean<N> {
 /// base_color, roughness and metallic of a surface's own material at a place of a triangle.
 pub fn appearance(world: &World, surface: SurfaceIndex, triangle: usize, barycentrics: Vec3) -> Option<Appearance> {
     let shown = &world.scene().surfaces[surface.0];
-    let uv = shown.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| {
-        let [a, b, c] = shown.mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
-        a * barycentrics.x + b * barycentrics.y + c * barycentrics.z
-    });
+    let uv = shown.mesh.uv_at(triangle, barycentrics).unwrap_or_default();
     world.scene().materials[shown.material.0].appearance(world.textures(), uv)
 }
 
@@ -107,14 +104,6 @@ pub struct PixelHit {
     /// Whether the front is visible: the side of the vertex normals, or without them the side from which the triangle's
     /// corners run counter-clockwise. A one-sided emitter emits on that side.
     pub front: bool,
-}
-
-impl PixelHit {
-    /// Interpolates values given at the vertices.
-    pub fn interpolate(&self, triangles: &[[u32; 3]], values: &[Vec2]) -> Vec2 {
-        let [a, b, c] = triangles[self.triangle].map(|vertex| values[vertex as usize]);
-        a * self.barycentrics.x + b * self.barycentrics.y + c * self.barycentrics.z
-    }
 }
 
 /// The first hit behind each of `pixels`, or `None`, as [`hit_through`] finds it, without depth and normal.

@@ -433,7 +433,7 @@ mod tests {
         let colors = aov::coarse_subpixels(x, y).map(|place| {
             let hit = aov::hit_through(world, camera, place).unwrap();
             let mesh = &scene.surfaces[hit.surface.0].mesh;
-            let uv = hit.interpolate(&mesh.triangles, mesh.uvs.as_ref().unwrap()) * 0.25;
+            let uv = mesh.uv_at(hit.triangle, hit.barycentrics).unwrap() * 0.25;
             scene.textures[hit.surface.0].texture.sample(uv.to_array())
         });
         [0, 1, 2].map(|c| colors.iter().map(|color| color[c]).sum::<f32>() / colors.len() as f32)

@@ -99,10 +99,7 @@ struct Lookup {
 impl Lookup {
     /// None where the instance has no atlas.
     fn of(hit: &Hit, atlases: &[TriangleMesh]) -> Option<Self> {
-        let mesh = &atlases[hit.surface.0];
-        let uvs = mesh.uvs.as_deref()?;
-        let [a, b, c] = mesh.triangles[hit.triangle.0].map(|vertex| uvs[vertex as usize]);
-        let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
+        let uv = atlases[hit.surface.0].uv_at(hit.triangle.0, hit.barycentrics)?;
         Some(Self { instance: hit.surface.0, uv })
     }
 }

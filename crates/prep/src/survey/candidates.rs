@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::ids::id_text_from;
@@ -236,7 +236,7 @@ impl RoomSearch<'_> {
     fn look_at(&self, camera: &Camera, place: DVec2) -> Option<Seen> {
         let hit = hit_through(self.world, camera, place)?;
         let surface = &self.house.scene.surfaces[hit.surface.0];
-        let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
+        let uv = surface.mesh.uv_at(hit.triangle, hit.barycentrics).unwrap_or_default();
         let material = &self.house.scene.materials[surface.material.0];
         let color = material.appearance(self.world.textures(), uv).map_or([0.5; 3], |seen| seen.base_color);
         let distance = camera.camera_direction(place).length() * hit.depth;

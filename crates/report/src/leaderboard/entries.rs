@@ -8,7 +8,6 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, SceneError, Severity, json};
-use mateval_eval::EvalError;
 use mateval_eval::result::key::{Region, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
 use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
@@ -18,7 +17,7 @@ use mateval_submission::lint::submission_json::check_method_name;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::ReportError;
+use crate::error::{ReportError, fitting};
 use crate::ranking::file::Ranking;
 use crate::strips::Shown;
 
@@ -105,7 +104,7 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
     for path in &files.results {
         let Some(result) = read_result(path, &mut findings)? else { continue };
         let sidecar = sidecar(path);
-        let mark = fitting(verification_of(path, &result), "a verification", &sidecar, &mut findings)?;
+        let mark = fitting(verification_of(path, &result), "a verification", &sidecar, UNFIT, &mut findings)?;
         entries.verified.push(mark.unwrap_or(Verified::No));
         entries.results.push(result);
         paths.push(path.as_path());
@@ -114,7 +113,7 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
         entries.ceiling = read_result(path, &mut findings)?;
     }
     if let Some(path) = &files.errata {
-        entries.errata = fitting(ErrataFile::read(path), "errata", path, &mut findings)?;
+        entries.errata = fitting(ErrataFile::read(path), "errata", path, UNFIT, &mut findings)?;
     }
     let results = &entries.results;
     let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
@@ -231,11 +230,7 @@ pub(super) fn verification_of(path: &Path, result: &ResultFile) -> Result<Verifi
 
 /// The result in the file, if it is one; what is wrong with it or with its method's name is added to the findings.
 fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<ResultFile>, ReportError> {
-    let read = ResultFile::read(path).map_err(|error| match error {
-        EvalError::Dataset(error) => ReportError::Dataset(error),
-        other => ReportError::Eval(other),
-    });
-    let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
+    let Some(mut result) = fitting(ResultFile::read(path), "a result", path, UNFIT, findings)? else { return Ok(None) };
     let bad_name = check_method_name(&result.method, Severity::Error, &path.display().to_string());
     findings.extend(bad_name.map(|finding| Finding { place: "/method".to_owned(), ..finding }));
     // Single pictures are most of a result's memory, and the site shows those of curves alone.
@@ -246,33 +241,6 @@ fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<Result
         scores.pictures.shrink_to_fit();
     }
     Ok(Some(result))
-}
-
-/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends
-/// the reading.
-fn fitting<T>(
-    read: Result<T, ReportError>,
-    expected: &str,
-    path: &Path,
-    findings: &mut Vec<Finding>,
-) -> Result<Option<T>, ReportError> {
-    let (place, found) = match read {
-        Ok(value) => return Ok(Some(value)),
-        Err(ReportError::Dataset(SceneError::Format { found, expected: format, .. })) => {
-            (String::new(), format!("the format '{found}' in place of '{format}'"))
-        }
-        Err(ReportError::Dataset(SceneError::Invalid { findings: faults, .. })) => {
-            let fault = faults.into_iter().next().map(|fault| (fault.place, fault.message));
-            fault.unwrap_or_default()
-        }
-        Err(ReportError::Eval(EvalError::Contradiction { place, said, found, .. })) => {
-            (place, format!("{said} where its own numbers give {found}"))
-        }
-        Err(other) => return Err(other),
-    };
-    let message = format!("expected {expected}, found: {found}");
-    findings.push(error("unfit_file", path, &place, message, UNFIT));
-    Ok(None)
 }
 
 /// A finding for each file whose value an earlier file has too. `what` names the value, and `place` is its JSON

@@ -1,6 +1,7 @@
 //! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers
 //! were measured on other renders and are never ranked with results.
 
+use mateval_dataset::dataset::DatasetVersion;
 use mateval_eval::metric::{Better, Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::key::Views;
@@ -12,10 +13,9 @@ use serde_json::Value;
 use super::board::Board;
 use super::entries::ErrataFile;
 use super::site::{Page, SiteWriter};
-use mateval_dataset::dataset::DatasetVersion;
-
 use crate::error::ReportError;
 use crate::ranking::file::{IntervalKind, RankingRules};
+use crate::tables::{BlockWords, PAPER, TableWords};
 
 const TABLES: &str = include_str!("paper_tables.json");
 
@@ -151,29 +151,12 @@ struct ShownRow {
     cells: Vec<String>,
 }
 
-/// A block's title, picture and views.
-type Block = (&'static str, PictureKind, Views);
-
-/// Number and title, and the blocks.
-type Words = (&'static str, &'static [Block]);
-
-const LAYOUT: [Words; 4] = [
-    (
-        "Table II: RGB, fitted light",
-        &[("Input view", PictureKind::RgbFitted, Views::Input), ("Novel views", PictureKind::RgbFitted, Views::Novel)],
-    ),
-    (
-        "Table III: albedo, input view",
-        &[("Albedo", PictureKind::Albedo, Views::Input), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Input)],
-    ),
-    (
-        "Table IV: albedo, novel views",
-        &[("Albedo", PictureKind::Albedo, Views::Novel), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Novel)],
-    ),
-    (
-        "Table V: aligned albedo, unobserved regions",
-        &[("Aligned albedo", PictureKind::AlbedoAligned, Views::Unobserved)],
-    ),
+/// Of the tables of [`PAPER`].
+const TITLES: [&str; 4] = [
+    "Table II: RGB, fitted light",
+    "Table III: albedo, input view",
+    "Table IV: albedo, novel views",
+    "Table V: aligned albedo, unobserved regions",
 ];
 
 const METRICS: [Metric; 4] = [Metric::Mse, Metric::Psnr, Metric::Ssim, Metric::LpipsAlex];
@@ -189,18 +172,18 @@ fn metric_head(metric: Metric) -> String {
 /// The tables, ready to be shown.
 fn paper_page() -> PaperPage {
     let tables: PaperTables = serde_json::from_str(TABLES).expect("a test reads the file");
-    let table = |(title, blocks): Words| PaperTable {
+    let table = |(title, (_, blocks)): (&'static str, TableWords)| PaperTable {
         title,
         metrics: METRICS.map(metric_head),
         blocks: blocks.iter().map(|(title, ..)| *title).collect(),
         rows: tables.rows.iter().filter_map(|row| shown(row, blocks)).collect(),
     };
-    PaperPage { source: tables.source, note: tables.note, tables: LAYOUT.map(table).into() }
+    PaperPage { source: tables.source, note: tables.note, tables: TITLES.into_iter().zip(PAPER).map(table).collect() }
 }
 
 /// None if the paper leaves the row out of the table.
-fn shown(row: &PaperRow, blocks: &[Block]) -> Option<ShownRow> {
-    let cells = |(_, picture, views): &Block| -> [Option<String>; 4] {
+fn shown(row: &PaperRow, blocks: &[BlockWords]) -> Option<ShownRow> {
+    let cells = |(_, picture, views): &BlockWords| -> [Option<String>; 4] {
         let found = row.scores.iter().find(|scores| scores.picture == *picture && scores.views == *views);
         let text = |metric: Metric, value: f64| Some(format!("{value:.*}", metric.style().digits));
         found.map_or([const { None }; 4], |PaperScores { mse, psnr, ssim, lpips, .. }| {

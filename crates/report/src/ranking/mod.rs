@@ -150,12 +150,9 @@ impl<'a> Entrant<'a> {
         self.result.shown_method()
     }
 
-    /// The fingerprint that it would have if these scenes had been scored; without scenes, a hash of everything else
-    /// that scores depend on.
+    /// See [`ResultFile::basis`].
     fn basis(&self, scenes: &[&SceneId]) -> String {
-        let weights = self.result.lpips_weights.get(&self.scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
-        let dataset = &self.result.dataset;
-        self.scores.protocol.fingerprint(&dataset.manifest_sha256, scenes, weights)
+        self.result.basis(self.scores, scenes)
     }
 }
 

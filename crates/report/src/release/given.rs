@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
-use mateval_eval::EvalError;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_files::FileError;
@@ -17,7 +16,7 @@ use mateval_prep::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::ReportError;
+use crate::error::{ReportError, fitting};
 
 /// All states, in the order in which they are counted.
 const STATES: [State; 6] =
@@ -79,7 +78,7 @@ pub fn read_comparisons(paths: &[PathBuf], dataset: &Dataset) -> Result<BTreeMap
     let mut verdicts: BTreeMap<SceneId, (PathBuf, SceneVerdict)> = BTreeMap::new();
     for path in json_files(paths)? {
         let read = json::read_format::<CompareFile>(&path, COMPARE_FORMAT);
-        let Some(file) = fitting(read, "a comparison", &path, &mut findings)? else { continue };
+        let Some(file) = fitting(read, "a comparison", &path, ACTION, &mut findings)? else { continue };
         if let Some(finding) = foreign(&path, &file.dataset.manifest_sha256, dataset) {
             findings.push(finding);
             continue;
@@ -228,7 +227,7 @@ pub fn read_bounds(
     let [first, second] = [ceiling, floor].map(|path| path.map(|path| result(path, protocol, dataset, &mut findings)));
     let (first, second) = (first.transpose()?.flatten(), second.transpose()?.flatten());
     if let (Some(first), Some((result, scores)), Some(path)) = (&first, &second, floor)
-        && basis(&first.0, &first.1, &[]) != basis(result, scores, &[])
+        && first.0.basis(&first.1, &[]) != result.basis(scores, &[])
     {
         let message = "its rules, scorer or LPIPS weights are not those of the ceiling".to_owned();
         findings.push(unfit(path, &format!("/protocols/{protocol}/fingerprint"), message));
@@ -249,16 +248,9 @@ fn result(
     dataset: &Dataset,
     findings: &mut Vec<Finding>,
 ) -> Result<Option<Scored>, ReportError> {
-    let read = match ResultFile::read(path) {
-        Ok(result) => Ok(result),
-        Err(EvalError::Dataset(error)) => Err(error),
-        Err(EvalError::Contradiction { place, said, found, .. }) => {
-            findings.push(unfit(path, &place, format!("it states {said}, but its own numbers give {found}")));
-            return Ok(None);
-        }
-        Err(other) => return Err(other.into()),
+    let Some(mut result) = fitting(ResultFile::read(path), "a result", path, ACTION, findings)? else {
+        return Ok(None);
     };
-    let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
     let before = findings.len();
     findings.extend(foreign(path, &result.dataset.manifest_sha256, dataset));
     findings.extend(unknown_scenes(path, &result, dataset));
@@ -289,16 +281,10 @@ fn unknown_scenes(path: &Path, result: &ResultFile, dataset: &Dataset) -> Option
 
 /// A finding if the fingerprint does not follow from the rest of the result.
 fn changed(path: &Path, result: &ResultFile, protocol: &str, scores: &ProtocolResult) -> Option<Finding> {
-    let found = basis(result, scores, &result.dataset.scenes.iter().collect::<Vec<_>>());
+    let found = result.basis(scores, &result.dataset.scenes.iter().collect::<Vec<_>>());
     let place = format!("/protocols/{protocol}/fingerprint");
     let message = || format!("does not follow from protocol, dataset, scenes and weights, which give {found}");
     (found != scores.fingerprint).then(|| unfit(path, &place, message()))
-}
-
-/// The fingerprint for these scenes; without scenes, a hash of everything else that scores depend on.
-fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
-    let weights = result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
-    scores.protocol.fingerprint(&result.dataset.manifest_sha256, scenes, weights)
 }
 
 /// What to do with a file that does not fit.
@@ -307,28 +293,6 @@ const ACTION: &str = "make it again from this dataset, or leave it out";
 /// A finding about the place, a JSON pointer, of a file.
 fn unfit(path: &Path, place: &str, message: String) -> Finding {
     Finding::new(Severity::Error, "unfit_file", path.display().to_string(), place, message, ACTION)
-}
-
-/// What was read from the file at `path`. A file that is not what was `expected` is a finding; any other failure ends
-/// the reading.
-fn fitting<T>(
-    read: Result<T, SceneError>,
-    expected: &str,
-    path: &Path,
-    findings: &mut Vec<Finding>,
-) -> Result<Option<T>, SceneError> {
-    let (place, found) = match read {
-        Ok(value) => return Ok(Some(value)),
-        Err(SceneError::Format { found, expected, .. }) => {
-            ("/format".to_owned(), format!("the format '{found}' in place of '{expected}'"))
-        }
-        Err(SceneError::Invalid { findings: faults, .. }) => {
-            faults.into_iter().next().map(|fault| (fault.place, fault.message)).unwrap_or_default()
-        }
-        Err(other) => return Err(other),
-    };
-    findings.push(unfit(path, &place, format!("expected {expected}, found: {found}")));
-    Ok(None)
 }
 
 /// A finding if the file is about another dataset than this one; `manifest` is the hash that it states.

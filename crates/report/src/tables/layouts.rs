@@ -85,13 +85,13 @@ pub(super) struct Layout {
 const POOLED: [Quantity; 3] = [Quantity::Pixels, Quantity::Score(Metric::Mse), Quantity::Score(Metric::Psnr)];
 
 /// A block's title, kind of picture and views.
-type BlockWords = (&'static str, PictureKind, Views);
+pub(crate) type BlockWords = (&'static str, PictureKind, Views);
 
 /// A table's title, and its blocks.
-type TableWords = (&'static str, &'static [BlockWords]);
+pub(crate) type TableWords = (&'static str, &'static [BlockWords]);
 
 /// The paper's Tables II to V in its order.
-const PAPER: [TableWords; 4] = [
+pub(crate) const PAPER: [TableWords; 4] = [
     (
         "RGB, fitted light",
         &[("Input view", PictureKind::RgbFitted, Views::Input), ("Novel views", PictureKind::RgbFitted, Views::Novel)],

@@ -139,7 +139,7 @@ impl<'a> Eye<'a> {
         let uvs = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]].map(|place| {
             let hit = hit_through(&self.world, self.camera, corner + DVec2::from(place))?;
             (hit.surface.0 == instance).then_some(())?;
-            Some(hit.interpolate(&mesh.triangles, mesh.uvs.as_deref()?).to_array())
+            Some(mesh.uv_at(hit.triangle, hit.barycentrics)?.to_array())
         });
         let uvs = [uvs[0]?, uvs[1]?, uvs[2]?, uvs[3]?];
         Some((instance, SeenPixel { uvs, photo: self.photo.as_ref().map(|photo| photo.get(x, y).0), tile }))
