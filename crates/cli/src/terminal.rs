@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use console::Term;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+pub use mateval_dataset::ids::counted;
 use mateval_dataset::progress::fitted;
 use mateval_dataset::{Finding, Progress, Report, Severity};
 
@@ -70,11 +71,6 @@ pub fn say(text: &str) {
         None => text.to_owned(),
     };
     let _ = writeln!(std::io::stderr().lock(), "{text}");
-}
-
-/// A count with its noun: `1 scene`, `2 scenes`.
-pub fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Prints warnings and errors to stderr, each after `title`; notes are only counted, and can be read in `file`.

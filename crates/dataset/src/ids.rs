@@ -37,6 +37,11 @@ pub fn id_text_from(name: &str, fallback: &str) -> String {
     if trimmed.is_empty() { fallback.to_owned() } else { trimmed }
 }
 
+/// A count with its noun: `1 scene`, `2 scenes`.
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Ids as sentences list them: `'a', 'b'`.
 pub fn quoted<I: std::fmt::Display>(ids: &[I]) -> String {
     ids.iter().map(|id| format!("'{id}'")).collect::<Vec<_>>().join(", ")

@@ -37,6 +37,11 @@ pub fn is_ground_truth(file: &str) -> bool {
     parts.next() == Some("scenes") && parts.nth(1) == Some("ground_truth")
 }
 
+/// Whether a path in the dataset is that of an input picture.
+pub fn is_input_picture(file: &str) -> bool {
+    file.ends_with("/views/input/rgb.exr") || file.ends_with("/views/input/rgb.png")
+}
+
 /// Whether a file, by its path in the dataset or in its scene's folder, is made by rendering other files of the scene.
 pub fn is_rendered(file: &str) -> bool {
     // Scenes and instances may be named `renders` too.

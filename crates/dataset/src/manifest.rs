@@ -17,6 +17,12 @@ use crate::{Finding, SceneError, SceneId, Severity, json};
 
 /// The code of a finding about a file that the manifest lists and the dataset lacks.
 pub const MISSING_FILE: &str = "missing_file";
+
+/// Whether a file is missing because the whole ground truth of its scene is withheld, which is not a fault.
+pub fn is_withheld(root: &Path, finding: &Finding) -> bool {
+    let folder = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
+    finding.code == MISSING_FILE && folder.is_some_and(|folder| !folder.exists())
+}
 const UNLISTED_FILE: &str = "unlisted_file";
 
 /// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files

@@ -76,17 +76,14 @@ impl Dataset {
     pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, SceneError> {
         let chosen = known_ids(&self.root, &self.file, ids)?;
         let is_needed = |id: &&SceneId| ids.contains(id) || self.scenes.is_empty();
-        self.check_present(self.absent.iter().filter(is_needed).cloned().collect())?;
+        let absent = self.absent.iter().filter(is_needed).cloned().collect();
+        check_none_absent(&self.root, &self.file, absent)?;
         Ok(self.scenes.iter().filter(|scene| chosen.contains(&&scene.id)).collect())
     }
 
     /// Fails where a scene is absent, for work that needs all scenes.
     pub fn check_whole(&self) -> Result<(), SceneError> {
-        self.check_present(self.absent.clone())
-    }
-
-    fn check_present(&self, absent: Vec<SceneId>) -> Result<(), SceneError> {
-        check_none_absent(&self.root, &self.file, absent)
+        check_none_absent(&self.root, &self.file, self.absent.clone())
     }
 
     /// For work on the scenes that exist: a sentence that states how many are absent, or none where all exist.

@@ -8,7 +8,7 @@ use mateval_image::{LinearRgb, Picture};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::layout::is_rendered;
+use crate::layout::{is_input_picture, is_rendered};
 use crate::manifest::SceneHashes;
 use crate::{RendererId, SceneError, SceneId, ViewId};
 use mateval_files::untrusted::sha256_of_bytes;
@@ -99,7 +99,7 @@ pub struct ScorerFile {
 pub fn light_inputs_sha256(root: &Path, scene: &SceneId) -> Result<String, SceneError> {
     let hashes = SceneHashes::open(root, scene)?;
     // The input picture is a copy of a render.
-    let is_input = |file: &str| !is_rendered(file) && !file.contains("/views/input/rgb.");
+    let is_input = |file: &str| !is_rendered(file) && !is_input_picture(file);
     let inputs = hashes.entries().filter(|(file, _)| is_input(file));
     let lines: String = inputs.map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();
     Ok(sha256_of_bytes(lines.as_bytes()))

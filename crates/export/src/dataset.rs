@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{INPUT, MANIFEST};
-use mateval_dataset::manifest::{self, Entry, MISSING_FILE};
+use mateval_dataset::manifest::{self, Entry, is_withheld};
 use mateval_dataset::open::{Dataset, is_below};
-use mateval_dataset::{Camera, Finding, Progress, Report, SceneError, SceneId, ViewId};
+use mateval_dataset::{Camera, Progress, Report, SceneError, SceneId, ViewId};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 
@@ -126,12 +126,6 @@ impl SoundDataset {
         }
         Err(ExportError::HiddenFiles { path: root.join(MANIFEST), files: hidden })
     }
-}
-
-/// Whether a file is missing because the whole ground truth of its scene is withheld.
-fn is_withheld(root: &Path, finding: &Finding) -> bool {
-    let folder = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
-    finding.code == MISSING_FILE && folder.is_some_and(|folder| !folder.exists())
 }
 
 /// Whether a file, or a folder on the way to it, is hidden.

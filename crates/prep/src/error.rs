@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mateval_dataset::dataset::PerturbationKind;
-use mateval_dataset::ids::quoted;
+use mateval_dataset::ids::{counted, quoted};
 use mateval_dataset::{RendererId, SceneId};
 use mateval_files::FileError;
 use mateval_files::untrusted::in_words;
@@ -120,7 +120,7 @@ pub enum PrepError {
     },
     #[error(
         "'{}' lacks {} of the recipe: {}; make them by `prep build --scene`, or finish without them by --without",
-        path.display(), counted_scenes(scenes), quoted(scenes)
+        path.display(), counted(scenes.len(), "scene"), quoted(scenes)
     )]
     MissingScenes { path: PathBuf, scenes: Vec<SceneId> },
     #[error(
@@ -163,18 +163,14 @@ fn joined(faults: &[RecipeFault]) -> String {
 fn other_scenes(changed: &[SceneId], dropped: &[SceneId]) -> String {
     let mut text = String::new();
     if !changed.is_empty() {
-        let (count, ids) = (counted_scenes(changed), quoted(changed));
+        let (count, ids) = (counted(changed.len(), "scene"), quoted(changed));
         text += &format!("\n  {count} would be made otherwise: {ids}; replace one by --scene SCENE --force");
     }
     if !dropped.is_empty() {
-        let (count, ids) = (counted_scenes(dropped), quoted(dropped));
+        let (count, ids) = (counted(dropped.len(), "scene"), quoted(dropped));
         text += &format!(
             "\n  {count} not in the recipe: {ids}; name them there, and leave them out by `prep finish --without`"
         );
     }
     text + "\n  --force without --scene makes the whole dataset again"
-}
-
-fn counted_scenes(scenes: &[SceneId]) -> String {
-    if scenes.len() == 1 { "1 scene".to_owned() } else { format!("{} scenes", scenes.len()) }
 }

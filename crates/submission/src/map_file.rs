@@ -9,7 +9,7 @@ use std::path::Path;
 
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
 use mateval_dataset::{SceneError, TriangleMesh};
-use mateval_files::untrusted::{kind_name, shortened};
+use mateval_files::untrusted::{is_lfs_pointer, kind_name, shortened};
 use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
 use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
 use mateval_image::{ImageError, Texels, Texture, texture_io};
@@ -124,7 +124,7 @@ fn check_kind(path: &Path, bytes: &[u8]) -> Result<(), FileFault> {
     } else {
         (PNG_SIGNATURE, "PNG")
     };
-    if bytes.starts_with(b"version https://git-lfs") {
+    if is_lfs_pointer(bytes) {
         let message = "a Git LFS pointer, not the file that it stands for";
         return Err(FileFault::new("git_lfs_pointer", message, "fetch the file itself (git lfs pull)"));
     }

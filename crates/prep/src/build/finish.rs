@@ -7,8 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
-use mateval_dataset::layout::BuildFolder;
-use mateval_dataset::layout::{DATASET, SceneFolder, TARGETS, is_rendered};
+use mateval_dataset::layout::{BuildFolder, DATASET, SceneFolder, TARGETS, is_input_picture, is_rendered};
 use mateval_dataset::manifest;
 use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::open::{check_whole, read_dataset_file};
@@ -203,11 +202,6 @@ fn scene_hashes(
     }
     let entries = lists.iter().flat_map(|(_, _, list)| list.entries());
     Ok(entries.map(|(file, sha256)| (file.to_owned(), sha256.to_owned())).collect())
-}
-
-/// Whether a path in the dataset is that of an input picture.
-fn is_input_picture(path: &str) -> bool {
-    path.ends_with("/views/input/rgb.exr") || path.ends_with("/views/input/rgb.png")
 }
 
 /// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no

@@ -102,14 +102,11 @@ fn word_or_none(word: &Option<String>) -> String {
 
 fn findings(total: &Counts) -> Table {
     let mut rows = vec![row(["severity", "code", "findings"])];
-    rows.extend(total.findings.iter().map(|found| {
-        let severity = match found.severity {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-            Severity::Note => "note",
-        };
-        row([severity, &shown(&found.code, LONGEST_CELL), &found.count.to_string()])
-    }));
+    rows.extend(
+        total.findings.iter().map(|found| {
+            row([&found.severity.to_string(), &shown(&found.code, LONGEST_CELL), &found.count.to_string()])
+        }),
+    );
     Table { title: "Findings about the sources".to_owned(), words: 2, rows }
 }
 

@@ -8,6 +8,8 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::ids::counted;
+
 use super::survey_file::{Choice, ChosenType, Selection, SurveyedHouse, SurveyedRoom, TargetedMean};
 
 /// What the chosen scenes are to be like.
@@ -133,15 +135,14 @@ fn nearest(open: &[Candidate], chosen: &Chosen, goal: &SelectionGoal) -> Option<
 
 fn not_chosen(house_is_full: bool, goal: &SelectionGoal) -> String {
     match house_is_full {
-        true => format!("its house has given {}, the most of one house", counted(goal.per_house)),
+        true => format!("its house has given {}, the most of one house", counted(goal.per_house, "scene")),
         false => {
-            format!("{} were chosen, each of which was nearer to the goal or has a better rank", counted(goal.scenes))
+            format!(
+                "{} were chosen, each of which was nearer to the goal or has a better rank",
+                counted(goal.scenes, "scene")
+            )
         }
     }
-}
-
-fn counted(scenes: usize) -> String {
-    if scenes == 1 { "1 scene".to_owned() } else { format!("{scenes} scenes") }
 }
 
 impl Chosen {

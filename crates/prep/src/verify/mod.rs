@@ -13,6 +13,7 @@ use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
+use mateval_dataset::manifest::is_withheld;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::open::{absent_scenes, is_below, read_dataset_file};
 use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
@@ -96,12 +97,6 @@ fn absence(absent: &[SceneId], total: usize) -> Finding {
         format!("{} of {total} scenes have no folder here: {}", absent.len(), quoted(absent)),
         "they were not checked",
     )
-}
-
-/// Whether a file is missing because the whole ground truth of its scene is withheld, which is not a fault.
-fn is_withheld(root: &Path, finding: &Finding) -> bool {
-    let inside = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
-    finding.code == "missing_file" && inside.is_some_and(|folder| !folder.exists())
 }
 
 fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {

@@ -23,6 +23,7 @@ pub mod submission_json;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use mateval_dataset::ids::counted;
 use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::{Finding, Progress, Report, Severity};
 use schemars::JsonSchema;
@@ -177,10 +178,6 @@ fn line(text: &mut String, finding: &FoldedFinding) {
         let _ = write!(text, " ({} times; also {}{rest})", finding.count, more.join(", "));
     }
     text.push('\n');
-}
-
-fn counted(count: usize, word: &str) -> String {
-    format!("{count} {word}{}", if count == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]
