@@ -7,7 +7,7 @@ use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io
 use mateval_metrics::{Psnr, mse};
 use mateval_tracer::World;
 
-use super::file::{BASE_COLOR_PSNR_DB, Check, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG, Quantity, State};
+use super::file::{BOUNDS, Check, Quantity, State};
 use super::pictures::TheirView;
 use super::tiles::median;
 
@@ -94,10 +94,10 @@ fn base_color(ours: &Picture<LinearRgb>, theirs: &Picture<LinearRgb>, valid: &Ma
     let error = mse(theirs, ours, Some(valid)).ok().flatten();
     let psnr = error.and_then(|mse| Psnr::from_mse(mse).ok()).map(|psnr| psnr.db);
     let message = psnr.map_or("no valid pixel lies away from edges".to_owned(), |db| {
-        format!("PSNR {db:.1} dB over valid pixels away from edges, expected at least {BASE_COLOR_PSNR_DB} dB")
+        format!("PSNR {db:.1} dB over valid pixels away from edges, expected at least {} dB", BOUNDS.base_color_psnr_db)
     });
-    let agrees = psnr.map(|db| db >= BASE_COLOR_PSNR_DB);
-    check("base_color", Quantity::PsnrDb, agrees, (psnr, BASE_COLOR_PSNR_DB), count, message)
+    let agrees = psnr.map(|db| db >= BOUNDS.base_color_psnr_db);
+    check("base_color", Quantity::PsnrDb, agrees, (psnr, BOUNDS.base_color_psnr_db), count, message)
 }
 
 fn ids(picture: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Check {
@@ -110,11 +110,11 @@ fn ids(picture: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Check {
         format!(
             "{:.2} % of {count} ids away from edges are equal, expected at least {} %",
             100.0 * share,
-            100.0 * EQUAL_ID_SHARE
+            100.0 * BOUNDS.equal_id_share
         )
     });
-    let agrees = share.map(|share| share >= EQUAL_ID_SHARE);
-    check(picture, Quantity::EqualShare, agrees, (share, EQUAL_ID_SHARE), count, message)
+    let agrees = share.map(|share| share >= BOUNDS.equal_id_share);
+    check(picture, Quantity::EqualShare, agrees, (share, BOUNDS.equal_id_share), count, message)
 }
 
 fn depths(ours: &OurGeometry, theirs: &Picture<f32>, instance: Option<&Picture<u16>>) -> Check {
@@ -122,10 +122,10 @@ fn depths(ours: &OurGeometry, theirs: &Picture<f32>, instance: Option<&Picture<u
     let common = common(ours, instance);
     let off = median(common.iter().map(|at| off(*at)).collect());
     let message = off.map_or("no pixel shows the same instance".to_owned(), |off| {
-        format!("median difference {:.3} mm, expected at most {} mm", 1e3 * off, 1e3 * DEPTH_MEDIAN_M)
+        format!("median difference {:.3} mm, expected at most {} mm", 1e3 * off, 1e3 * BOUNDS.depth_median_m)
     });
-    let agrees = off.map(|off| off <= DEPTH_MEDIAN_M);
-    check("depth", Quantity::MedianM, agrees, (off, DEPTH_MEDIAN_M), common.len(), message)
+    let agrees = off.map(|off| off <= BOUNDS.depth_median_m);
+    check("depth", Quantity::MedianM, agrees, (off, BOUNDS.depth_median_m), common.len(), message)
 }
 
 fn normals(ours: &OurGeometry, theirs: &Picture<Normal>, instance: Option<&Picture<u16>>) -> Check {
@@ -133,10 +133,10 @@ fn normals(ours: &OurGeometry, theirs: &Picture<Normal>, instance: Option<&Pictu
     let angles = common.iter().map(|at| angle_deg(ours.normal.pixels()[*at], theirs.pixels()[*at]));
     let off = median(angles.collect());
     let message = off.map_or("no pixel shows the same instance".to_owned(), |off| {
-        format!("median angle {off:.2} degrees, expected at most {NORMAL_MEDIAN_DEG}")
+        format!("median angle {off:.2} degrees, expected at most {}", BOUNDS.normal_median_deg)
     });
-    let agrees = off.map(|off| off <= NORMAL_MEDIAN_DEG);
-    check("normal", Quantity::MedianDeg, agrees, (off, NORMAL_MEDIAN_DEG), common.len(), message)
+    let agrees = off.map(|off| off <= BOUNDS.normal_median_deg);
+    check("normal", Quantity::MedianDeg, agrees, (off, BOUNDS.normal_median_deg), common.len(), message)
 }
 
 /// The angle between two normals of any length, in degrees; 180 where one of them is zero.

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use mateval_image::{LinearRgb, Mask, Picture};
 
 use super::file::{
-    Check, GROUP_SUM, LightComparison, MaterialKind, MeanDifference, NOISE_OVER_BOUND, PICTURE_MEAN, Quantity,
-    STANDARD_ERRORS, State, TilesApart, TilesCompared, WorstTile, file_check,
+    BOUNDS, Check, LightComparison, MaterialKind, MeanDifference, Quantity, State, TilesApart, TilesCompared,
+    WorstTile, file_check,
 };
 use super::tiles::{Difference, Halves, Tile, allowance, difference, median, tiles};
 
@@ -86,7 +86,7 @@ pub(super) fn compare(
         picture: picture.to_owned(),
         light,
         means,
-        mean: (!deciding.is_empty()).then(|| relative(&mean, PICTURE_MEAN, scale)),
+        mean: (!deciding.is_empty()).then(|| relative(&mean, BOUNDS.picture_mean, scale)),
         tiles,
         apart: apart.collect(),
     };
@@ -140,7 +140,7 @@ fn relative(off: &Difference, bound: f64, scale: [f64; 3]) -> MeanDifference {
 }
 
 fn tile_check(picture: &str, tiles: &TilesCompared, bound: f64) -> Check {
-    let noisy = tiles.noise.is_some_and(|noise| noise > NOISE_OVER_BOUND);
+    let noisy = tiles.noise.is_some_and(|noise| noise > BOUNDS.noise_over_bound);
     let state = match () {
         () if tiles.count == 0 => State::Undecided,
         () if tiles.over > tiles.allowed => State::Differs,
@@ -155,10 +155,11 @@ fn tile_check(picture: &str, tiles: &TilesCompared, bound: f64) -> Check {
             percent(bound),
         ),
         _ => format!(
-            "{} of {} tiles are off by more than {} of the mean plus {STANDARD_ERRORS} standard errors, expected at most {}{}",
+            "{} of {} tiles are off by more than {} of the mean plus {} standard errors, expected at most {}{}",
             tiles.over,
             tiles.count,
             percent(bound),
+            BOUNDS.standard_errors,
             tiles.allowed,
             tiles.worst.filter(|_| state == State::Differs).map_or(String::new(), |worst| worst_text(&worst)),
         ),
@@ -184,15 +185,15 @@ fn worst_text(worst: &WorstTile) -> String {
 }
 
 fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], pixels: usize) -> Check {
-    let noisy = mean.noise(PICTURE_MEAN, scale).is_some_and(|noise| noise > NOISE_OVER_BOUND);
+    let noisy = mean.noise(BOUNDS.picture_mean, scale).is_some_and(|noise| noise > BOUNDS.noise_over_bound);
     let state = match () {
         () if pixels == 0 => State::Undecided,
-        () if mean.is_over(PICTURE_MEAN, scale) => State::Differs,
+        () if mean.is_over(BOUNDS.picture_mean, scale) => State::Differs,
         () if noisy => State::TooNoisy,
         () => State::Agrees,
     };
-    let worst = relative(mean, PICTURE_MEAN, scale);
-    let bound = worst.standard_error.map(|error| PICTURE_MEAN + STANDARD_ERRORS * error);
+    let worst = relative(mean, BOUNDS.picture_mean, scale);
+    let bound = worst.standard_error.map(|error| BOUNDS.picture_mean + BOUNDS.standard_errors * error);
     let message = match (worst.difference, bound) {
         _ if state == State::Undecided => "no tile is free of materials that are known to differ".to_owned(),
         (Some(off), Some(bound)) => {
@@ -239,18 +240,19 @@ pub(super) fn sum_check(picture: &str, half: &Picture<LinearRgb>, groups: &[&Pic
     }
     let (off, at) = largest;
     let (x, y) = (at % half.width().max(1), at / half.width().max(1));
-    let agrees = off <= GROUP_SUM;
+    let agrees = off <= BOUNDS.group_sum;
     let place = if agrees { String::new() } else { format!(", at pixel ({x}, {y})") };
     let message = format!(
-        "the sum of {} groups differs by {off:.1e} of a pixel, expected at most {GROUP_SUM:.0e}{place}",
-        groups.len()
+        "the sum of {} groups differs by {off:.1e} of a pixel, expected at most {:.0e}{place}",
+        groups.len(),
+        BOUNDS.group_sum
     );
     Check {
         picture: picture.to_owned(),
         quantity: Quantity::GroupSum,
         state: if agrees { State::Agrees } else { State::Differs },
         measured: Some(off),
-        bound: Some(GROUP_SUM),
+        bound: Some(BOUNDS.group_sum),
         count: half.pixels().len(),
         message,
     }
@@ -262,7 +264,6 @@ fn percent(share: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::file::LAMBERT_TILE;
     use super::*;
     use mateval_dataset::splitmix64;
 
@@ -299,7 +300,7 @@ mod tests {
     }
 
     fn states(ours: &Halves, theirs: &Halves) -> [State; 2] {
-        let (_, checks) = compare("rgb", None, [ours, theirs], &all_lambert(), LAMBERT_TILE);
+        let (_, checks) = compare("rgb", None, [ours, theirs], &all_lambert(), BOUNDS.lambert_tile);
         checks.map(|check| check.state)
     }
 
@@ -329,7 +330,7 @@ mod tests {
             let (mut by_tiles, mut by_mean, mut noisy, mut by_share_alone) = (0, 0, 0, 0);
             for draw in 0..1000 {
                 let (ours, theirs) = (plain(2 * draw, noise), plain(2 * draw + 1, noise));
-                let (found, checks) = compare("rgb", None, [&ours, &theirs], &all_lambert(), LAMBERT_TILE);
+                let (found, checks) = compare("rgb", None, [&ours, &theirs], &all_lambert(), BOUNDS.lambert_tile);
                 let [tiles, mean] = checks.map(|check| check.state);
                 by_tiles += usize::from(tiles == State::Differs);
                 by_mean += usize::from(mean == State::Differs);
@@ -378,7 +379,7 @@ mod tests {
         let valid = Picture::from_fn(SIZE.0, SIZE.1, |x, y| !is_window(x, y));
         let states = |valid: &Mask| {
             let shown = ShownKinds::new(&Picture::filled(SIZE.0, SIZE.1, 1), &[MaterialKind::Lambert], valid);
-            compare("rgb", None, [&ours, &theirs], &shown, LAMBERT_TILE).1.map(|check| check.state)
+            compare("rgb", None, [&ours, &theirs], &shown, BOUNDS.lambert_tile).1.map(|check| check.state)
         };
         assert_eq!(states(&valid), [State::Differs; 2]);
         // The twin: relative to the mean of the whole picture the error is a third of a percent.
@@ -419,7 +420,7 @@ mod tests {
         });
         let shown = ShownKinds::new(&instance, &kinds, &all_valid());
         let theirs = halves(2, 0.01, |x, _| if x < 32 { 1.5 } else { 1.0 });
-        let (found, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &shown, LAMBERT_TILE);
+        let (found, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &shown, BOUNDS.lambert_tile);
         assert_eq!(checks.map(|check| check.state), [State::Agrees; 2]);
         let apart: Vec<_> = found.apart.iter().map(|apart| (apart.kind, apart.count, apart.over)).collect();
         assert_eq!(apart, [(MaterialKind::Conductor, 10, 0), (MaterialKind::Dielectric, 10, 10)]);
@@ -429,7 +430,7 @@ mod tests {
         assert_eq!(states(&plain(1, 0.01), &theirs), [State::Differs; 2]);
         // Where no tile counts, the state is `undecided`.
         let glass = ShownKinds::new(&Picture::filled(SIZE.0, SIZE.1, 3), &kinds, &all_valid());
-        let (_, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &glass, LAMBERT_TILE);
+        let (_, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &glass, BOUNDS.lambert_tile);
         assert_eq!(checks.map(|check| check.state), [State::Undecided; 2]);
     }
 
@@ -444,7 +445,10 @@ mod tests {
         assert!(check.measured.is_some_and(|off| off < 1e-6), "{check}");
         assert_eq!(sum_check("rgb_a", &half, &[&a]).state, State::Differs);
         let off = |share: f32| sum_check("rgb_a", &half, &[&a, &part(0.7 + share)]).state;
-        assert_eq!([off(0.9 * GROUP_SUM as f32), off(1.1 * GROUP_SUM as f32)], [State::Agrees, State::Differs]);
+        assert_eq!(
+            [off(0.9 * BOUNDS.group_sum as f32), off(1.1 * BOUNDS.group_sum as f32)],
+            [State::Agrees, State::Differs]
+        );
     }
 
     /// Halves rendered with the same seed are reported; halves of two seeds, and black halves, are not.

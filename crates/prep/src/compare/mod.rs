@@ -34,8 +34,8 @@ use mateval_metrics::Psnr;
 use mateval_tracer::World;
 
 use self::file::{
-    BOUNDS, COMPARE_FORMAT, CompareFile, LAMBERT_TILE, LightComparison, MaterialKind, OTHER_TILE, SceneComparison,
-    SourceComparison, State, ViewComparison, file_check,
+    BOUNDS, COMPARE_FORMAT, CompareFile, LightComparison, MaterialKind, SceneComparison, SourceComparison, State,
+    ViewComparison, file_check,
 };
 use self::geometry::{OurGeometry, TheirGeometry};
 use self::light::ShownKinds;
@@ -174,8 +174,8 @@ fn compare_scene(
     let world = World::new(reference.clone())?;
     let kinds = MaterialKind::of_surfaces(&reference);
     let tile_bound = match kinds.iter().all(|kind| *kind == MaterialKind::Lambert) {
-        true => LAMBERT_TILE,
-        false => OTHER_TILE,
+        true => BOUNDS.lambert_tile,
+        false => BOUNDS.other_tile,
     };
     let compared: Vec<&View> = scene.views.iter().filter(|view| rendered(folder, view).is_some()).collect();
     let samples = match samples {

@@ -13,7 +13,7 @@ use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
 use mateval_tracer::{RenderSettings, ViewLight, World, render_views};
 
-use super::file::{Check, STANDARD_ERRORS, State, file_check};
+use super::file::{BOUNDS, Check, State, file_check};
 use super::light::ShownKinds;
 use super::tiles::{Halves, Tile, median};
 use crate::error::PrepError;
@@ -156,7 +156,7 @@ fn ratio([ours, theirs]: [&Halves; 2], shown: &ShownKinds, bound: f64) -> Option
     let of_tile = |tile: &Tile| {
         let [own, other] = [ours, theirs].map(|halves| halves.variance(tile.pixels()));
         let ratio = |c: usize| {
-            let allowed = other[c].max((SHARE_OF_BOUND * bound * scale[c] / STANDARD_ERRORS).powi(2));
+            let allowed = other[c].max((SHARE_OF_BOUND * bound * scale[c] / BOUNDS.standard_errors).powi(2));
             if allowed > 0.0 { own[c] / allowed } else { 0.0 }
         };
         (0..3).map(ratio).fold(0.0, f64::max)

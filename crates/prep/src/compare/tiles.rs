@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use mateval_image::{LinearRgb, Picture};
 
-use super::file::{FALSE_ALARM, STANDARD_ERRORS, TILE_SHARE_OVER};
+use super::file::{BOUNDS, FALSE_ALARM};
 
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 16;
@@ -116,7 +116,7 @@ impl Difference {
     pub(super) fn excess(&self, bound: f64, scale: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|c| match self.mean[c].abs() {
             0.0 => 0.0,
-            off => off / (bound * scale[c] + STANDARD_ERRORS * self.error[c]),
+            off => off / (bound * scale[c] + BOUNDS.standard_errors * self.error[c]),
         })
     }
 
@@ -134,7 +134,7 @@ impl Difference {
     /// Three standard errors divided by the bound, in the channel with the largest quotient; absent if `scale` is 0
     /// in every channel.
     pub(super) fn noise(&self, bound: f64, scale: [f64; 3]) -> Option<f64> {
-        let of = |c: usize| (scale[c] > 0.0).then(|| STANDARD_ERRORS * self.error[c] / (bound * scale[c]));
+        let of = |c: usize| (scale[c] > 0.0).then(|| BOUNDS.standard_errors * self.error[c] / (bound * scale[c]));
         (0..3).filter_map(of).max_by(f64::total_cmp)
     }
 
@@ -142,7 +142,7 @@ impl Difference {
     /// two tails of a normal distribution in each channel.
     fn false_alarm(&self, bound: f64, scale: [f64; 3]) -> f64 {
         let tails = |c: usize| {
-            let errors = STANDARD_ERRORS + bound * scale[c] / self.error[c];
+            let errors = BOUNDS.standard_errors + bound * scale[c] / self.error[c];
             if self.error[c] > 0.0 { libm::erfc(errors / std::f64::consts::SQRT_2) } else { 0.0 }
         };
         (0..3).map(tails).sum::<f64>().min(1.0)
@@ -155,7 +155,7 @@ impl Difference {
 /// noise.
 pub(super) fn allowance(tiles: &[Difference], bound: f64, scale: [f64; 3]) -> (usize, f64) {
     let expected = tiles.iter().map(|tile| tile.false_alarm(bound, scale)).sum();
-    ((TILE_SHARE_OVER * tiles.len() as f64) as usize + poisson_quantile(expected), expected)
+    ((BOUNDS.tile_share_over * tiles.len() as f64) as usize + poisson_quantile(expected), expected)
 }
 
 /// The smallest k that a Poisson variable of this mean exceeds with a probability of at most [`FALSE_ALARM`].
