@@ -41,26 +41,13 @@ pub enum SceneFault {
         causes(findings)
     )]
     NothingSeen { findings: Vec<Finding> },
-    #[error(
-        "{message}; at most {:.0} % may be missing, unless the recipe's scene has `allow_missing = true`{}",
-        100.0 * most, causes(findings)
-    )]
-    Missing {
+    #[error("{message}; at most {:.0} % may be {allowed}{}", 100.0 * most, causes(findings))]
+    TooMuch {
         message: String,
-        /// The largest share that may be missing.
+        /// The largest share that is accepted.
         most: f64,
-        findings: Vec<Finding>,
-    },
-    #[error(
-        "{message}; at most {:.0} % may be unstated. Give the materials a colour or a texture (bake procedural ones); \
-         or, where the exporter leaves out a white that is meant, write `allow_unstated = true` for the scene in the \
-         recipe{}",
-        100.0 * most, causes(findings)
-    )]
-    Unstated {
-        message: String,
-        /// The largest share that may be unstated.
-        most: f64,
+        /// What it is a share of, and how to have more accepted.
+        allowed: &'static str,
         findings: Vec<Finding>,
     },
     #[error(

@@ -52,7 +52,8 @@ pub(super) fn check_missing(
     let elsewhere = elsewhere.find(|found| !found.is_empty()).unwrap_or_default();
     let message = format!("{count} of {wanted} {} are missing, such as '{example}'{elsewhere}", missing.what);
     if share > MOST_MISSING && !entry.allow_missing {
-        return Err(SceneFault::Missing { message, most: MOST_MISSING, findings: above_notes(findings) });
+        let allowed = "missing, unless the recipe's scene has `allow_missing = true`";
+        return Err(SceneFault::TooMuch { message, most: MOST_MISSING, allowed, findings: above_notes(findings) });
     }
     Ok(Some(Finding::new(
         if share > FEW_MISSING { Severity::Warning } else { Severity::Note },
@@ -168,7 +169,11 @@ pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> R
         names.collect::<Vec<_>>().join(", ")
     );
     if total > MOST_UNSTATED && !entry.allow_unstated {
-        return Err(SceneFault::Unstated { message, most: MOST_UNSTATED, findings: above_notes(&plan.findings) });
+        let allowed = "unstated. Give the materials a colour or a texture (bake procedural ones); or, where the \
+                       exporter leaves out a white that is meant, write `allow_unstated = true` for the scene in the \
+                       recipe";
+        let findings = above_notes(&plan.findings);
+        return Err(SceneFault::TooMuch { message, most: MOST_UNSTATED, allowed, findings });
     }
     Ok(Some(Finding::new(
         Severity::Warning,
