@@ -13,7 +13,7 @@ use std::sync::Arc;
 use mateval_dataset::dataset::{DatasetFile, Instance, SceneFile};
 use mateval_dataset::dataset::{Perturbation, PerturbationKind, PerturbedGeometry};
 use mateval_dataset::glb::{self, GlbNode};
-use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth};
+use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, is_input_picture};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
@@ -127,8 +127,8 @@ impl PerturbedScene {
 /// Whether [`write_scene`] writes this public file of a dataset.
 fn is_rewritten(file: &str) -> bool {
     let Some((_, in_scene)) = file.strip_prefix("scenes/").and_then(|rest| rest.split_once('/')) else { return false };
-    let is_photo = in_scene.ends_with("/rgb.exr") || in_scene.ends_with("/rgb.png");
-    in_scene == "scene.json" || in_scene.starts_with("geometry/") || in_scene.starts_with("views/") && !is_photo
+    let is_picture = in_scene.starts_with("views/") && !is_input_picture(file);
+    in_scene == "scene.json" || in_scene.starts_with("geometry/") || is_picture
 }
 
 /// Writes meshes, `scene.json` and the pictures of geometry of the scene in `from`, moved by `amount`, to `to`.
