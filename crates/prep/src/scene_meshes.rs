@@ -1,9 +1,9 @@
 //! Compares the meshes of a finished scene, one for each instance and each part, with its `scene.json`.
 
-use mateval_dataset::dataset::{Part, SceneFile};
+use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::glb::{self, GlbNode};
 use mateval_dataset::layout::{SceneFolder, part_picture, parts_file};
-use mateval_dataset::{Finding, PartSetId, Severity};
+use mateval_dataset::{Finding, Severity};
 
 use crate::error::PrepError;
 
@@ -19,11 +19,13 @@ pub struct Meshes {
 impl Meshes {
     /// For each set of parts its picture's file, and the part's value in it for every triangle of every instance.
     pub fn part_values(&self, scene: &SceneFile) -> Vec<(String, Vec<Vec<u16>>)> {
-        let values = |((set, parts), of_triangles): ((Option<&PartSetId>, &[Part]), &Vec<Vec<usize>>)| {
+        let mut sets = Vec::new();
+        for ((set, parts), of_triangles) in scene.all_part_sets().zip(&self.part_sets) {
             let value = |part: &usize| parts[*part].index.0.get();
-            (part_picture(set), of_triangles.iter().map(|instance| instance.iter().map(value).collect()).collect())
-        };
-        scene.all_part_sets().zip(&self.part_sets).map(values).collect()
+            let values = of_triangles.iter().map(|instance| instance.iter().map(value).collect());
+            sets.push((part_picture(set), values.collect()));
+        }
+        sets
     }
 }
 
