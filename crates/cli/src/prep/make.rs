@@ -51,7 +51,11 @@ pub struct SurveyArgs {
     #[arg(long = "list", value_name = "LIST.csv")]
     lists: Vec<PathBuf>,
     /// The rules that drawn cameras keep. They also decide on resolution and field of view where none is given.
-    #[arg(long, default_value = CameraRules::default().word(), value_parser = word_parser(CameraRules::ALL, |rules| (rules.word(), rules.summary())))]
+    #[arg(
+        long,
+        default_value = CameraRules::default().word(),
+        value_parser = word_parser(CameraRules::ALL, |rules| (rules.word(), rules.summary())),
+    )]
     camera_rules: CameraRules,
     /// Choose this many scenes for the recipe, which together are like the paper's: with 13.2 objects of 4.3
     /// super-categories on average, and equally many of each room type. Without it the recipe has every accepted room.
