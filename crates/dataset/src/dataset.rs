@@ -1,4 +1,4 @@
-//! The types of a dataset's JSON files, which `dataset_spec/FORMAT.md` documents for readers of the files: the dataset,
+//! The types of a dataset's JSON files, which `dataset_spec/format` documents for readers of the files: the dataset,
 //! its scenes, the roles of their instances, and how perturbed geometry differs from the true one.
 
 use std::borrow::Cow;
@@ -369,7 +369,7 @@ impl fmt::Display for SourceKind {
     }
 }
 
-// The words are listed once, in `dataset_spec/FORMAT.md`, so that a new source changes no schema.
+// The words are listed once, in `dataset_spec/format/dataset.md`, so that a new source changes no schema.
 impl JsonSchema for SourceKind {
     fn schema_name() -> Cow<'static, str> {
         "SourceKind".into()
@@ -377,7 +377,7 @@ impl JsonSchema for SourceKind {
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "The kind of source that a scene came from; FORMAT.md lists the words.",
+            "description": "The kind of source that a scene came from; format/dataset.md lists the words.",
             "type": "string",
             "pattern": "^[a-z0-9_]+$"
         })

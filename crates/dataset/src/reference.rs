@@ -557,7 +557,7 @@ mod tests {
             *map = Some(EmissionMap { texture: TextureIndex(texture), uv });
             scene
         };
-        // Its surface has no uv, which is no fault: see FORMAT.md.
+        // Its surface has no uv, which is no fault: see dataset_spec/format/truth.md.
         write(&folder, &mapped(5)).unwrap();
         assert_eq!(read(&folder).unwrap(), mapped(5));
         for absent in [6, usize::MAX] {
