@@ -60,6 +60,7 @@ impl DatasetFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Licence {
+    /// The scene that it holds for.
     pub scene: SceneId,
     /// The file that it came from, relative to the source.
     pub file: String,
@@ -81,7 +82,9 @@ pub struct TargetsFile {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
+    /// The scene's id.
     pub scene: SceneId,
+    /// The view's id, as in `scene.json`.
     pub view: ViewId,
 }
 
@@ -91,7 +94,9 @@ pub struct Target {
 pub struct SceneFile {
     /// Always `mateval/3`.
     pub format: String,
+    /// The name of its folder, too.
     pub id: SceneId,
+    /// Where it came from.
     pub source: SceneSource,
     /// The lights whose radiances track `fitted` fits: the scene's own, or a light stage's.
     pub lights: SceneLights,
@@ -236,6 +241,7 @@ pub struct Instance {
 pub struct Atlas {
     /// Texels a side of the baked truth.
     pub size: u32,
+    /// Number of charts.
     pub charts: u32,
     /// Share of the square that charts cover, 0 to 1.
     pub coverage: f64,
