@@ -4,6 +4,7 @@ A type that is used in one place is expanded there, under its path (`views[].cam
 table of its own: on the page of the format where all of its uses are, else on the page `shared.md`.
 """
 
+import html
 import json
 import re
 from collections import defaultdict
@@ -97,7 +98,9 @@ class Keys:
         page = self.place[name][0]
         lines = ["| Key | Type | Meaning |", "|---|---|---|"]
         for path, kind, meaning in self.rows(name, "", page):
-            lines.append(f"| `{path}` | {kind} | {cell(meaning)} |")
+            # Long paths may be broken between their keys.
+            broken = html.escape(path).replace(".", ".<wbr>")
+            lines.append(f"| <code>{broken}</code> | {kind} | {cell(meaning)} |")
         return "\n".join(lines) + "\n"
 
     def rows(self, name: str, prefix: str, page: str, node: dict | None = None):
