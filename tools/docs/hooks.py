@@ -20,6 +20,7 @@ import keys  # noqa: E402
 DOCS = "dataset_spec"
 TUTORIAL = "crates/python/tutorial.ipynb"
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
+LIST = re.compile(r"^((?!- |\d+\. |[|#\s]).+\n)(?=- |1\. )", re.MULTILINE)
 FENCE = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
 
 #: The file of the repository that a page of the site shows; pages that are made are not listed.
@@ -66,6 +67,8 @@ def on_page_markdown(markdown: str, page, config, files: Files) -> str:
     source = shown.get(page.file.src_uri)
     if source is None:
         return markdown
+    # Chapters come before tables of keys in a search.
+    page.meta.setdefault("search", {"boost": 2})
 
     def moved(found: re.Match) -> str:
         picture, text, link = found.groups()
@@ -79,7 +82,8 @@ def on_page_markdown(markdown: str, page, config, files: Files) -> str:
         return f"{picture}[{text}]({place}{'#' + fragment if fragment else ''})"
 
     parts = FENCE.split(markdown)
-    return "".join(part if part.startswith("```") else LINK.sub(moved, part) for part in parts)
+    # Without an empty line before it, MkDocs sees no list.
+    return "".join(part if part.startswith("```") else LIST.sub(r"\1\n", LINK.sub(moved, part)) for part in parts)
 
 
 def target(page: str, link: str) -> str | None:
