@@ -115,5 +115,22 @@ def notebook(path: str) -> str:
     return "\n\n".join(text if kind == "markdown" else f"```python\n{text}\n```" for text, kind in texts)
 
 
-#: The names of its many members are headings, which would come first in every search.
-PYTHON = "---\nsearch: { boost: 0.001 }\n---\n\n# Python API\n\n::: mateval\n"
+#: The names of the package's many members are headings, which would come first in every search.
+PYTHON = """---
+search: { boost: 0.001 }
+---
+
+# Python API
+
+::: mateval
+
+## mateval.metrics
+
+::: mateval.metrics
+    options: { heading_level: 3 }
+
+## mateval.torch
+
+::: mateval.torch
+    options: { heading_level: 3 }
+"""
