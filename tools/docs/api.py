@@ -12,14 +12,18 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path("crates/python/python/mateval")
-#: Lines of an example, which are put into a block of code.
 EXAMPLE = re.compile(r"^( *)>>> .*\n(?:\1(?:>>>|\.\.\.) .*\n)*", re.MULTILINE)
+
+
+def fenced(text: str) -> str:
+    """A text with its examples in blocks of code."""
+    return EXAMPLE.sub(r"\1```python\n\g<0>\1```\n", text)
 
 
 def document(node: ast.AST, thing: object) -> None:
     """Puts the docstrings of a class and its members, or of a function, into its stub."""
     if text := getattr(thing, "__doc__", None):
-        node.body.insert(0, ast.Expr(ast.Constant(text)))
+        node.body.insert(0, ast.Expr(ast.Constant(fenced(text + "\n"))))
     for member in node.body if isinstance(node, ast.ClassDef) else []:
         if isinstance(member, ast.FunctionDef) and member.name == "__new__":
             # mkdocstrings shows the arguments of this name with the class.
@@ -41,11 +45,11 @@ def main(extension: str, folder: str) -> None:
     for node in stub.body:
         if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
             document(node, getattr(core, node.name))
+    for file in package.glob("*.py"):
+        file.write_text(fenced(file.read_text()))
     (package / "_core.py").write_text(ast.unparse(stub))
     (package / "_core.pyi").unlink()
     compiled.unlink()
-    for file in package.glob("*.py"):
-        file.write_text(EXAMPLE.sub(r"\1```python\n\g<0>\1```\n", file.read_text()))
 
 
 main(*sys.argv[1:])
