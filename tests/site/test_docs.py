@@ -11,9 +11,9 @@ from urllib.parse import unquote
 
 from chromium import Page
 
-SITE = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")) / "docs_site"
+SITE = Path(__file__).parents[2] / "target/docs_site"
 PICTURES = os.environ.get("MATEVAL_TEST_PICTURES")
-#: Boxes that are wider than the window, unless they lie in a part that scrolls by itself.
+#: Tables and code may be wider than the window, since they scroll by themselves.
 WIDE = "document.documentElement.scrollWidth > innerWidth"
 
 
