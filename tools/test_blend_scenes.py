@@ -229,7 +229,7 @@ class Scenes(Bake):
         rows = LIMITS["world_rows"]
         found = np.array(image.pixels[:]).reshape(rows, 2 * rows, 4)[::-1, :, :3] - 2.0
         u, v = (np.arange(2 * rows) + 0.5) * math.pi / rows, ((np.arange(rows) + 0.5) * math.pi / rows)[:, None]
-        # FORMAT.md: u = atan2(x, -z) / 2 pi and v = acos(y) / pi, in glTF's axes.
+        # format/truth.md: u = atan2(x, -z) / 2 pi and v = acos(y) / pi, in glTF's axes.
         x, y, z = np.sin(v) * np.sin(u), np.cos(v) + 0.0 * u, -np.sin(v) * np.cos(u)
         np.testing.assert_allclose(found, np.stack([x, -z, y], axis=-1), atol=0.01)
 

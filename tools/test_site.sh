@@ -1,6 +1,6 @@
 #!/bin/sh
 # Tests the leaderboard's site in headless Chromium, which this installs. Arguments name tests:
-# tools/test_site.sh test_site.TestBoard
+# tools/test_site.sh test_site.TestBoard. `test_docs` tests the site of the documentation, which tools/docs.sh builds.
 set -eu
 cd "$(dirname "$0")/.."
 tools/apt_install.sh chromium fonts-dejavu-core

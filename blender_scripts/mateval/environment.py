@@ -1,6 +1,6 @@
 """The coordinates at which Blender looks up an environment map. Needs no bpy.
 
-The format (FORMAT.md, "Environment lookup") turns a direction into the map's frame, d = Rt w, and looks up
+The format (format/truth.md, "Environment lookup") turns a direction into the map's frame, d = Rt w, and looks up
 u = atan2(d.x, -d.z) / 2 pi, v = acos(d.y) / pi from the top. Blender looks b up at u = 1/2 - atan2(b.y, b.x) / 2 pi,
 v = 1/2 + asin(b.z) / pi from the bottom. Both are the same for b = (d.z, d.x, d.y).
 """

@@ -160,8 +160,8 @@ def add(*, name: str, data: bpy.types.ID, matrix: Matrix, scene: bpy.types.Scene
 def read_world(*, source: bpy.types.Scene, bench: bpy.types.Scene, job: Job, findings: Findings) -> dict:
     """Returns the world's radiance, or renders its map of directions to `world.exr`.
 
-    The map's left edge looks to the -Z of glTF, and u grows towards +X: FORMAT.md, "Environment lookup", without a
-    rotation.
+    The map's left edge looks to the -Z of glTF, and u grows towards +X: format/truth.md, "Environment lookup", without
+    a rotation.
     """
     world = source.world
     if world is None:

@@ -1,6 +1,6 @@
 """Materials and lamps of a job as Cycles' shader graphs.
 
-The names of models and inputs are those of `reference.json` and `lights.json` (dataset_spec/FORMAT.md, section 8).
+The names of models and inputs are those of `reference.json` and `lights.json` (dataset_spec/format/truth.md).
 `approximation` states where Cycles only comes near a model.
 """
 
@@ -110,7 +110,7 @@ def distribution_of(*, microfacets: Job | None) -> str:
 
 
 def base_color(*, tree: Tree, textures: Textures, model: Job) -> Socket | None:
-    """Adds the base_color that methods recover (FORMAT.md, section 8); none for glass."""
+    """Adds the base_color that methods recover (format/truth.md); none for glass."""
     match model["type"]:
         case "diffuse":
             return color_of(tree=tree, textures=textures, given=model["reflectance"])

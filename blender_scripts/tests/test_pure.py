@@ -154,7 +154,7 @@ class Lenses(unittest.TestCase):
 
 
 def ours(*, direction: tuple[float, ...]) -> tuple[float, float]:
-    """FORMAT.md, "Environment lookup": u to the right, v from the top."""
+    """format/truth.md, "Environment lookup": u to the right, v from the top."""
     x, y, z = direction
     return (math.atan2(x, -z) / (2.0 * math.pi) % 1.0, math.acos(y) / math.pi)
 

@@ -21,7 +21,7 @@ fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// A camera read from `scene.json` according to FORMAT.md: the columns of `world_from_camera` are its axes and
+/// A camera read from `scene.json` according to format/dataset.md: the columns of `world_from_camera` are its axes and
 /// position, it looks along its -Z, +Y is up, pixels are counted from the top left.
 struct Eye {
     axes: [Point; 3],

@@ -152,13 +152,13 @@ fn near(found: [f64; 3], expected: [f64; 3], slack: f64) -> bool {
     found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < slack)
 }
 
-/// FORMAT.md, section 4: pixel (60, 210) of the input view, its depth, its place in the world and in `up_left`.
+/// format/dataset.md, "Camera": pixel (60, 210) of the input view, its depth, its place in the world and in `up_left`.
 #[test]
 fn the_worked_example_of_the_camera_is_right() {
-    let text = std::fs::read_to_string(spec("FORMAT.md")).unwrap();
+    let text = std::fs::read_to_string(spec("format/dataset.md")).unwrap();
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for numbers in ["2.7076979", "(1.129893, 0.012000, 2.234759)", "2.695910, pixel position (81.6560, 232.5347)"] {
-        assert!(text.contains(numbers), "FORMAT.md no longer contains {numbers}");
+        assert!(text.contains(numbers), "format/dataset.md no longer contains {numbers}");
     }
     let scene: SceneFile = mateval_dataset::json::read(&spec("examples/scene.json")).unwrap();
     let [input, up_left] = [&scene.views[0].camera, &scene.views[1].camera];

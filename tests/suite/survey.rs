@@ -191,7 +191,7 @@ fn mean(rooms: &[&Value], key: &str) -> f64 {
     rooms.iter().map(|room| room[key].as_f64().unwrap()).sum::<f64>() / rooms.len() as f64
 }
 
-/// How far rooms are from the paper's, by the formula of FORMAT.md; the houses have rooms of two types.
+/// How far rooms are from the paper's, by the formula of format/recipe.md; the houses have rooms of two types.
 fn distance(rooms: &[&Value]) -> f64 {
     let living = rooms.iter().filter(|room| room["room_type"] == "LivingDiningRoom").count() as f64;
     let imbalance = 2.0 * (living / rooms.len() as f64 - 0.5).powi(2);

@@ -8,9 +8,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Intrinsics {
+    /// Number of columns of the picture.
     pub width: u32,
+    /// Number of rows of the picture.
     pub height: u32,
+    /// Focal length along rows, in pixels.
     pub fx: f64,
+    /// Focal length along columns, in pixels.
     pub fy: f64,
     /// Column of the principal point, in pixels from the left edge.
     pub cx: f64,

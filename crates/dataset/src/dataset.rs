@@ -1,4 +1,4 @@
-//! The types of a dataset's JSON files, which `dataset_spec/FORMAT.md` documents for readers of the files: the dataset,
+//! The types of a dataset's JSON files, which `dataset_spec/format` documents for readers of the files: the dataset,
 //! its scenes, the roles of their instances, and how perturbed geometry differs from the true one.
 
 use std::borrow::Cow;
@@ -84,6 +84,7 @@ impl fmt::Display for DatasetVersion {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Licence {
+    /// The scene that it holds for.
     pub scene: SceneId,
     /// The file that it came from, relative to the source.
     pub file: String,
@@ -105,7 +106,9 @@ pub struct TargetsFile {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
+    /// The scene's id.
     pub scene: SceneId,
+    /// The view's id, as in `scene.json`.
     pub view: ViewId,
 }
 
@@ -115,7 +118,9 @@ pub struct Target {
 pub struct SceneFile {
     /// Always `mateval/3`.
     pub format: String,
+    /// The name of its folder, too.
     pub id: SceneId,
+    /// Where it came from.
     pub source: SceneSource,
     /// The lights whose radiances track `fitted` fits: the scene's own, or a light stage's.
     pub lights: SceneLights,
@@ -260,6 +265,7 @@ pub struct Instance {
 pub struct Atlas {
     /// Texels a side of the baked truth.
     pub size: u32,
+    /// Number of charts.
     pub charts: u32,
     /// Share of the square that charts cover, 0 to 1.
     pub coverage: f64,
@@ -393,7 +399,7 @@ impl fmt::Display for SourceKind {
     }
 }
 
-// The words are listed once, in `dataset_spec/FORMAT.md`, so that a new source changes no schema.
+// The words are listed once, in `dataset_spec/format/dataset.md`, so that a new source changes no schema.
 impl JsonSchema for SourceKind {
     fn schema_name() -> Cow<'static, str> {
         "SourceKind".into()
@@ -401,7 +407,7 @@ impl JsonSchema for SourceKind {
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "The kind of source that a scene came from; FORMAT.md lists the words.",
+            "description": "The kind of source that a scene came from; format/dataset.md lists the words.",
             "type": "string",
             "pattern": "^[a-z0-9_]+$"
         })

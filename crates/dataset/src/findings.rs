@@ -31,6 +31,7 @@ impl std::fmt::Display for Severity {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
+    /// Whether the input could be used.
     pub severity: Severity,
     /// A stable word for the kind of fault, as in `missing_file`; snake_case.
     pub code: String,
@@ -48,8 +49,11 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FindingCount {
+    /// The severity.
     pub severity: Severity,
+    /// The code, as in a finding.
     pub code: String,
+    /// Number of findings.
     pub count: usize,
 }
 

@@ -97,6 +97,7 @@ pub enum Distribution {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Microfacets {
+    /// The distribution of normals.
     pub distribution: Distribution,
     pub alpha: ScalarInput,
 }
@@ -546,6 +547,7 @@ pub struct MaterialClassesFile {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClassifiedPart {
+    /// The part's id, as in `scene.json`.
     pub part: PartId,
     /// Its class; null where its triangles belong to several.
     pub class: Option<MaterialClass>,

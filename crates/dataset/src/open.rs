@@ -257,7 +257,9 @@ fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), Scen
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetId {
+    /// The dataset's name.
     pub name: String,
+    /// The dataset's version.
     pub version: String,
     /// SHA-256 of its manifest, hex.
     pub manifest_sha256: String,

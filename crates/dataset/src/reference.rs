@@ -89,6 +89,7 @@ impl EmissionMap {
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Emission {
     Area {
+        /// Indices of the surfaces that emit, in `reference.json`.
         surfaces: Vec<SurfaceIndex>,
         /// Linear Rec. 709 radiance, W/(m^2 sr) in the scene's own unit.
         radiance: [f32; 3],
@@ -201,6 +202,7 @@ pub struct ReferenceFile {
     pub format: String,
     /// In the order of the nodes of `geometry.glb`.
     pub surfaces: Vec<SurfaceEntry>,
+    /// The materials of the surfaces.
     pub materials: Vec<Material>,
     /// The textures of materials and lights.
     pub textures: Vec<TextureEntry>,
@@ -557,7 +559,7 @@ mod tests {
             *map = Some(EmissionMap { texture: TextureIndex(texture), uv });
             scene
         };
-        // Its surface has no uv, which is no fault: see FORMAT.md.
+        // Its surface has no uv, which is no fault: see dataset_spec/format/truth.md.
         write(&folder, &mapped(5)).unwrap();
         assert_eq!(read(&folder).unwrap(), mapped(5));
         for absent in [6, usize::MAX] {

@@ -30,9 +30,11 @@ pub enum Step {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StepCost {
+    /// The step of making the scene.
     pub step: Step,
     /// The renderer of the step `render`; null for the others.
     pub renderer: Option<RendererId>,
+    /// Number of runs that ended well.
     pub runs: usize,
     /// Elapsed time of all runs, in seconds.
     pub wall_seconds: f64,

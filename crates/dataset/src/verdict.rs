@@ -23,6 +23,7 @@ pub struct VerdictFile {
     /// SHA-256, hex, of the manifest of the dataset that was compared. After a change of the dataset the verdict is
     /// void.
     pub manifest_sha256: String,
+    /// By scene, the numbers of its checks.
     pub scenes: BTreeMap<SceneId, CompareCounts>,
 }
 

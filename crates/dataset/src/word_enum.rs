@@ -74,7 +74,7 @@ macro_rules! word_enum {
     };
 }
 
-/// Serde and a schema by way of `Display` and `FromStr`. The pattern holds the shape alone: `dataset_spec/FORMAT.md`
+/// Serde and a schema by way of `Display` and `FromStr`. The pattern holds the shape alone: `dataset_spec/format`
 /// lists the words.
 #[macro_export]
 macro_rules! by_text {

@@ -29,6 +29,7 @@ pub enum AlbedoSpace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
+    /// `mateval-3` or `paper`.
     pub name: String,
     /// The treatment of pixels outside a mask.
     pub mask_rule: MaskRule,
@@ -40,9 +41,11 @@ pub struct Protocol {
     pub rounded_decimals: u32,
     /// The numbers that a table would print; the first orders boards.
     pub headline: Vec<ResultKey>,
+    /// The rules of scores under light.
     pub light: LightRules,
     /// Constants that all protocols share because the code holds them.
     pub fixed: FixedRules,
+    /// The version of the scorer; `CHANGELOG.md` lists what each changed.
     pub scorer_version: u32,
 }
 
@@ -142,6 +145,7 @@ impl Track {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightRules {
+    /// The lights under which predictions are scored.
     pub tracks: Vec<Track>,
     /// The renderer whose `principled` material predictions use, with specular 0.5, two-sided and without bumps.
     pub flavour: PrincipledFlavour,
@@ -156,6 +160,7 @@ pub struct LightRules {
     pub stage: StageRules,
     pub fit: FitRules,
     pub relit: RelitRules,
+    /// How many paths are traced.
     pub samples: SampleRules,
 }
 
@@ -184,7 +189,9 @@ pub struct SampleRules {
     /// Samples per pixel of each half of a view of 320x240 pixels; inversely as many as a view has pixels, rounded to
     /// an even number.
     pub at_320x240: u32,
+    /// The least number of samples of a half.
     pub least: u32,
+    /// The largest number of samples of a half.
     pub most: u32,
     /// Side of the blocks of pixels within which noise counts as correlated, in pixels of the input view.
     pub block_pixels: u32,

@@ -31,11 +31,13 @@ pub struct ResultFile {
     pub tool: String,
     /// The method's name, from submission.json.
     pub method: String,
+    /// The submission that was scored.
     pub submission: SubmissionId,
     /// The dataset and the scored scenes.
     pub dataset: DatasetId,
     /// SHA-256 of the weights of each network; null where they were missing.
     pub lpips_weights: BTreeMap<String, Option<String>>,
+    /// By name, the scores under each protocol.
     pub protocols: BTreeMap<String, ProtocolResult>,
     /// Maps that the submission holds for no instance of any scored scene, by their words in its files. They have no
     /// values; under light they are the default.
@@ -70,6 +72,7 @@ impl ResultFile {
 pub struct SubmissionId {
     /// SHA-256, hex, over path and SHA-256 of submission.json and of every map of the scored scenes, in order.
     pub sha256: String,
+    /// Its description, as stated by the submission.
     pub description: String,
     /// Where to read about it, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -89,6 +92,7 @@ pub struct SubmissionId {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProtocolResult {
+    /// The rules.
     pub protocol: Protocol,
     /// Numbers of different fingerprints must not be compared.
     pub fingerprint: String,
@@ -101,6 +105,7 @@ pub struct ProtocolResult {
     /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where
     /// the error of a picture may be noise alone.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
+    /// By scene, the radiances that were fitted; only under `paper`.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// The values of every picture over every region.
     pub pictures: Vec<PictureValues>,
@@ -124,7 +129,9 @@ pub struct TracerCheck {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceTexelErrors {
+    /// The scene's id.
     pub scene: SceneId,
+    /// The instance's id.
     pub instance: InstanceId,
     /// Texels that the input view sees.
     pub observed: TexelErrors,
@@ -146,7 +153,9 @@ pub struct TexelErrors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstancePixelErrors {
+    /// The scene's id.
     pub scene: SceneId,
+    /// The instance's id.
     pub instance: InstanceId,
     /// The source's category; for architecture the kind of piece, as in `WallInner`; else null.
     pub category: Option<String>,
@@ -167,7 +176,9 @@ pub struct InstancePixelErrors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PictureValues {
+    /// The scene's id.
     pub scene: SceneId,
+    /// The view's id.
     pub view: ViewId,
     /// What was compared; ends with `_specular` where only pixels that are metal or smooth in truth count.
     pub picture: PictureName,
@@ -196,8 +207,11 @@ pub struct PictureValues {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissingMetric {
+    /// The metric, or the kind of picture.
     pub metric: MissingNumbers,
+    /// Why.
     pub reason: String,
+    /// The command that makes it available.
     pub fix: String,
 }
 

@@ -1,7 +1,7 @@
 //! Makes a dataset from source scenes, and examines finished ones.
 //!
 //! The inputs are a recipe and the folders that it names, which hold files of the sources that [`mateval_sources`]
-//! reads. The output is a dataset's folder as `dataset_spec/FORMAT.md` describes it.
+//! reads. The output is a dataset's folder as `dataset_spec/format` describes it.
 //!
 //! The steps: [`recipe`] reads and checks the whole recipe. [`build`] then makes scene by scene: it reads the source by
 //! [`mateval_sources`], numbers instances and parts, makes the pictures of the [`views`], unwraps the instances by

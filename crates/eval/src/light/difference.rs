@@ -37,8 +37,11 @@ pub struct DifferenceRules {
     pub ratio_offset: f32,
     /// The largest ratio r of base colours.
     pub most_ratio: f32,
+    /// b is r, but at most this.
     pub most_control: f32,
+    /// g is r, but at most this.
     pub most_guide: f32,
+    /// k is kept in this range.
     pub scale_range: [f64; 2],
     /// The pivot lies between k r R divided by this and k r R times this.
     pub pivot_factor: f64,

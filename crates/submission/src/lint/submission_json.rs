@@ -50,7 +50,7 @@ fn read(submission: &Path) -> Result<(Map<String, Value>, Vec<Finding>), Box<Fin
                 fault("no_submission_file", message, "hand in that, without the folders or the archive around it")
             }
             None => {
-                let action = "write it beside scenes/; FORMAT.md, section 11, lists its keys";
+                let action = "write it beside scenes/; dataset_spec/format/submission.md describes it";
                 fault("no_submission_file", "the file is missing".to_owned(), action)
             }
         });
@@ -72,7 +72,7 @@ fn read(submission: &Path) -> Result<(Map<String, Value>, Vec<Finding>), Box<Fin
         Value::Object(object) => match json::parse::<SubmissionFile>(&path, bytes) {
             Err(SceneError::Invalid { mut findings, .. }) if is_sound(&object) && !findings.is_empty() => {
                 Err(Box::new(Finding {
-                    action: "write it as FORMAT.md, section 11, states".to_owned(),
+                    action: "write it as dataset_spec/format/submission.md states".to_owned(),
                     ..findings.remove(0)
                 }))
             }
