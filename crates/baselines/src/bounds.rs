@@ -4,14 +4,23 @@
 use std::path::Path;
 
 use mateval_dataset::open::Dataset;
-use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
+use mateval_dataset::submission::{GREY as GREY_VALUE, MAP_SIZES, Map};
 use mateval_files::FileError;
 use mateval_image::Picture;
 use mateval_image::png_io::write_rgb_bytes;
 
 use crate::error::BaselineError;
 use crate::maps::srgb_bytes;
-use crate::submission::{Method, write};
+use crate::submission::{Baseline, Method, write};
+
+pub const TRUTH: Baseline = Baseline {
+    name: "gt",
+    about: "Ceiling: the true materials, baked to the dataset's own atlases",
+    write: write_truth,
+};
+
+pub const GREY: Baseline =
+    Baseline { name: "grey", about: "Floor: base colour 0.5 (linear) everywhere", write: write_grey };
 
 /// Copies the baked maps of every instance and returns the number of instances.
 pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
@@ -34,7 +43,7 @@ pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, 
 /// Writes base colour 0.5 (linear) for every instance and returns their number. Roughness and metallic have no files,
 /// so that the format's defaults hold.
 pub fn write_grey(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
-    let (side, texel) = (*MAP_SIZES.start(), srgb_bytes([GREY; 3]));
+    let (side, texel) = (*MAP_SIZES.start(), srgb_bytes([GREY_VALUE; 3]));
     let method = Method::new("grey", "base colour 0.5 (linear) everywhere, roughness 0.5, metallic 0");
     write(dataset, out, force, &method, |_, _, folder| {
         let path = folder.join(Map::BaseColor.stem()).with_extension("png");

@@ -31,3 +31,6 @@ pub mod procedural;
 pub mod submission;
 
 pub use error::BaselineError;
+
+/// The baselines that need a dataset and no options. Each is a command: `mateval baseline NAME`.
+pub const BASELINES: [submission::Baseline; 2] = [bounds::TRUTH, bounds::GREY];

@@ -31,6 +31,16 @@ impl Method {
     }
 }
 
+/// A baseline that needs a dataset and no options.
+pub struct Baseline {
+    /// The word of the command line.
+    pub name: &'static str,
+    /// A line for the command's help.
+    pub about: &'static str,
+    /// Writes the submission to a folder and returns the number of instances. With `force` it replaces an earlier one.
+    pub write: fn(&Dataset, &Path, bool) -> Result<usize, BaselineError>,
+}
+
 /// Writes a submission to `out` and returns the number of instances. `write_instance` is called for every instance that
 /// has an atlas, with the folder for its maps. `force` replaces an earlier submission.
 pub fn write(

@@ -7,13 +7,15 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use anyhow::bail;
+use clap::{ArgMatches, Args as _, FromArgMatches, Subcommand};
 use mateval_baselines::delight::{self, CandidateLights, DelightOptions};
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::fill::FillRule;
 use mateval_baselines::median::{self, MedianOf};
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, FitMode, ProceduralOptions, report_folder};
-use mateval_baselines::{bounds, bridges};
+use mateval_baselines::submission::Baseline;
+use mateval_baselines::{BASELINES, bridges};
 use mateval_dataset::PartSetId;
 
 use crate::arguments::{EstimateArgs, ExportPlaces, Places, word_parser};
@@ -22,10 +24,8 @@ use crate::terminal::{Outcome, counted, print, with_progress};
 /// Subcommands of `baseline`, one per method.
 #[derive(clap::Subcommand)]
 pub enum Command {
-    /// Ceiling: the true materials, baked to the dataset's own atlases.
-    Gt(Places),
-    /// Floor: base colour 0.5 (linear) everywhere.
-    Grey(Places),
+    #[command(flatten)]
+    WithoutOptions(WithoutOptions),
     /// Lifts an estimate of the input view to the atlases and fills unseen texels from their nearest seen points.
     Nn(NnArgs),
     /// One colour per instance, or per part: the median of an estimate inside its mask (IM2CAD).
@@ -86,10 +86,47 @@ pub struct MedianArgs {
     part_set: Option<PartSetId>,
 }
 
+/// One of the [`BASELINES`], with its only arguments.
+pub struct WithoutOptions {
+    baseline: Baseline,
+    places: Places,
+}
+
+impl Subcommand for WithoutOptions {
+    fn augment_subcommands(command: clap::Command) -> clap::Command {
+        command.subcommands(
+            BASELINES.map(|baseline| Places::augment_args(clap::Command::new(baseline.name)).about(baseline.about)),
+        )
+    }
+
+    fn augment_subcommands_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        BASELINES.iter().any(|baseline| baseline.name == name)
+    }
+}
+
+impl FromArgMatches for WithoutOptions {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let named = |(name, matches)| Some((BASELINES.into_iter().find(|baseline| baseline.name == name)?, matches));
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (baseline, matches) = matches.subcommand().and_then(named).ok_or_else(missing)?;
+        Ok(Self { baseline, places: Places::from_arg_matches(matches)? })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Gt(places) => places.done(bounds::write_truth(&places.open()?, &places.out, places.force)?),
-        Command::Grey(places) => places.done(bounds::write_grey(&places.open()?, &places.out, places.force)?),
+        Command::WithoutOptions(WithoutOptions { baseline, places }) => {
+            places.done((baseline.write)(&places.open()?, &places.out, places.force)?)
+        }
         Command::Nn(args) => nearest_neighbours(args),
         Command::Median(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
