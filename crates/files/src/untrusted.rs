@@ -120,7 +120,7 @@ pub fn mistaken_for(bytes: &[u8]) -> Option<&'static str> {
     let known = known.or_else(|| {
         is_web_page(bytes).then_some("a web page in place of the file; a download probably asked to sign in")
     });
-    let known = known.or_else(|| match bytes {
+    let known = known.or(match bytes {
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("a WebP picture"),
         // The four bytes behind the length are reserved; text has no zeros.
         [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some("a BMP picture"),

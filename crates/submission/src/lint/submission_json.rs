@@ -39,8 +39,10 @@ pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<F
     }
 }
 
+type Object = Map<String, Value>;
+
 /// The object, and a finding for each of its numbers that is out of range.
-fn read(submission: &Path) -> Result<(Map<String, Value>, Vec<Finding>), Box<Finding>> {
+fn read(submission: &Path) -> Result<(Object, Vec<Finding>), Box<Finding>> {
     let path = submission.join(SUBMISSION);
     let fault = |code: &str, message: String, action: &str| Box::new(error(code, SUBMISSION, message, action));
     if !exists(&path) {
@@ -67,8 +69,7 @@ fn read(submission: &Path) -> Result<(Map<String, Value>, Vec<Finding>), Box<Fin
         Box::new(Finding { place, ..*fault("bad_json", format!("{found}{}", hint(bytes)), "write it as JSON") })
     };
     match serde_json::from_slice(bytes).map_err(bad)? {
-        // Parsing the type finds what the parsed object no longer shows, such as a key that occurs twice.
-        // Below its keys, and where a key occurs twice, parsing the type finds the fault and its place.
+        // Parsing the type finds what the object does not show: faults below its keys, and a key that occurs twice.
         Value::Object(object) => match json::parse::<SubmissionFile>(&path, bytes) {
             Err(SceneError::Invalid { mut findings, .. }) if is_sound(&object) && !findings.is_empty() => {
                 Err(Box::new(Finding {
