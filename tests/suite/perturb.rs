@@ -194,7 +194,7 @@ fn what_cannot_be_perturbed_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     perturb(dataset(), "scale", 3, &out).ends_with(2).says("scale has the levels 0 to 2, found 3");
-    perturb(unrendered(), "scale", 1, &out).ends_with(2).says("has furniture");
+    perturb(unrendered(), "scale", 1, &out).ends_with(2).says("no scene with furniture");
     assert!(!out.exists());
     perturb(dataset(), "scale", 1, &out).ends_with(0);
     perturb(dataset(), "scale", 1, &out).ends_with(2).says("already exists");
