@@ -25,6 +25,7 @@ __all__ = [
     "Submission",
     "Truth",
     "View",
+    "__version__",
     "delight",
     "lift",
     "lint",
