@@ -133,4 +133,14 @@ search: { boost: 0.001 }
 
 ::: mateval.torch
     options: { heading_level: 3 }
+
+## mateval.display
+
+::: mateval.display
+    options: { heading_level: 3, members: [Pictures] }
+
+## mateval.progress
+
+::: mateval.progress
+    options: { heading_level: 3, members: [] }
 """
