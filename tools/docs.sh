@@ -14,9 +14,9 @@ fi
 MATEVAL=$(realpath "$MATEVAL")
 export MATEVAL
 tools/venv.sh python3.11 "$target/docs_venv" tools/requirements_docs.txt
-# mkdocs.yml names both folders.
+# tools/docs/mkdocs.yml names both folders.
 "$target/docs_venv/bin/python" tools/docs/api.py "$MATEVAL_EXTENSION" target/docs_python
 # The variable silences an advertisement. Signatures are formatted by ruff, which is looked for in PATH. With `--quiet`,
 # MkDocs would not count the warnings that `--strict` makes errors.
-NO_MKDOCS_2_WARNING=1 PATH="$target/docs_venv/bin:$PATH" PYTHONDONTWRITEBYTECODE=1 mkdocs build --strict
+NO_MKDOCS_2_WARNING=1 PATH="$target/docs_venv/bin:$PATH" PYTHONDONTWRITEBYTECODE=1 mkdocs build --strict --config-file tools/docs/mkdocs.yml
 echo "file://$PWD/target/docs_site/index.html"

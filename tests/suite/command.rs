@@ -78,7 +78,7 @@ pub fn render(dataset: &Path, samples: u32) -> Command {
     render_for_scores(dataset, samples, 2)
 }
 
-/// The same with so many samples of the references that scores under light can be compared.
+/// The same with enough samples in the references for scores under light.
 pub fn render_for_scores(dataset: &Path, samples: u32, references: u32) -> Command {
     let mut command = mateval();
     let [samples, references] = [samples, references].map(|number| number.to_string());

@@ -58,7 +58,7 @@ fn unknown_arguments() {
                  Usage: mateval baseline <COMMAND>\n\nFor more information, try '--help'.\n";
     check(&["baseline", "gray", "--dataset", "d", "--out", "o"], 2, "", error);
     let error = "error: invalid value '../up' for '--scene <SCENE>': '../up' is not an id: expected 1 to 64 \
-                 lower-case letters (a-z), digits, '-' and '_', of which the first is a letter or a digit\n\n  \
+                 lower-case letters (a-z), digits, '-' and '_', beginning with a letter or a digit\n\n  \
                  tip: `mateval prep stats DATASET` lists the ids of a dataset's scenes\n\nFor more information, try '--help'.\n";
     check(&["prep", "render", "d", "--scene", "../up"], 2, "", error);
     // Commands without their group, by the tree of commands.

@@ -13,7 +13,7 @@ const ID_PATTERN: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
 /// A text that is not an id.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "'{}' is not an id: expected 1 to 64 lower-case letters (a-z), digits, '-' and '_', of which the first is a letter or \
+    "'{}' is not an id: expected 1 to 64 lower-case letters (a-z), digits, '-' and '_', beginning with a letter or \
      a digit",
     shortened(.0)
 )]

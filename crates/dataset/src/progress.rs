@@ -53,9 +53,9 @@ pub fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
 }
 
 impl Table {
-    /// Title and rows with words aligned left and numbers right, or `none` for a table that has only a head. Of a table
-    /// that is wider than a terminal of `columns`, the columns stand in several blocks below each other, each of which
-    /// begins with those that name the rows.
+    /// Title and rows with words aligned left and numbers right, or `none` for a table that has only a head. A table
+    /// that is wider than a terminal of `columns` is broken into blocks of columns, and each begins with those that name
+    /// the rows.
     pub fn text(&self, columns: Option<usize>) -> String {
         let mut text = columns.map_or_else(|| self.title.clone(), |columns| fitted(&self.title, columns)) + "\n";
         if self.rows.len() <= 1 {

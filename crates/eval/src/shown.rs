@@ -63,7 +63,7 @@ pub struct SceneLight {
 }
 
 /// The views of a scene that are scored and share the input view's place, in the scene's order: in the lighting, or in
-/// the first of the protocol's tracks. Fails where the dataset has no reference for it.
+/// the first of the protocol's tracks. Empty if the scene has no such lighting; fails if the dataset has no reference.
 pub fn scene_light(
     dataset: &Dataset,
     scene: &SceneFile,
@@ -106,7 +106,7 @@ pub fn scene_light(
         }
         Ok(())
     })?;
-    if references.is_empty() && !submissions.is_empty() {
+    if references.is_empty() && !submissions.is_empty() && (lighting.is_none() || task.reference.is_none()) {
         return Err(EvalError::NoPhotoRenderer { dataset: dataset.root.clone() });
     }
     let rows = truths.into_iter().zip(references).enumerate();

@@ -119,7 +119,7 @@ impl FewerBits {
     }
 }
 
-/// The largest of 16-bit integers that were divided by 65535; none where the numbers are no such integers, or are those
+/// The largest of 16-bit integers that were divided by 65535; absent if the numbers are no such integers, or are those
 /// of bytes, which are multiples of 257.
 fn largest_word(values: &[f32]) -> Option<u16> {
     let (mut largest, mut are_bytes) = (0, true);

@@ -7,12 +7,18 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open;
+use mateval_eval::protocol::{Protocol, SampleRules};
+use mateval_eval::shown::scene_light;
+use mateval_image::SrgbRgb;
+use mateval_image::transfer::byte_from_unit;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyIterator, PyList, PyType};
 
+use crate::arrays::triples;
 use crate::instance::{Instance, Part, SceneSource};
-use crate::long_work::{failed, shown_in_notebook, unknown_id};
+use crate::long_work::{Listener, failed, run_long, shown_in_notebook, unknown_id};
 use crate::view::View;
 
 /// A dataset on disk. Opening it checks its JSON files against its manifest; pictures are read when they are used.
@@ -237,4 +243,45 @@ fn by_id<'a, T: pyo3::PyClass + Into<PyClassInitializer<T>>>(
     }
     let owner = format!("scene '{}'", scene.source.file().id);
     Ok(CLASS.import(py, "mateval.by_id", "ById")?.call1((owner, kind, all))?.unbind())
+}
+
+/// For `mateval.Scene.render`: the pictures of a submission that the scorer compares, by the id of the view.
+#[pyfunction]
+pub fn render<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    submission: PathBuf,
+    light: &str,
+    samples: u32,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let lighting = match light {
+        "true" => None,
+        name => Some(name.parse().map_err(|_| {
+            let expected = "'true', 'warm_cool', 'alone_1', 'alone_2', ...";
+            PyValueError::new_err(format!("light: expected {expected}, found '{name}'"))
+        })?),
+    };
+    if !(1..=4096).contains(&samples) {
+        return Err(PyValueError::new_err(format!("samples: expected 1 to 4096, found {samples}")));
+    }
+    let mut protocol = Protocol::named("mateval-3").map_err(failed)?;
+    protocol.light.samples =
+        SampleRules { at_320x240: samples, least: samples, most: samples, ..protocol.light.samples };
+    let listener = Listener::of(py, progress)?;
+    let source = Arc::clone(&scene.source);
+    let views = run_long(py, &listener, move |progress| {
+        scene_light(&source.dataset, source.file(), &[&submission], &protocol, lighting, progress)
+    })?
+    .map_err(failed)?;
+    if views.is_empty() {
+        return Err(PyValueError::new_err(format!("light: scene '{}' has no lighting '{light}'", scene.id())));
+    }
+    let pictures = PyDict::new(py);
+    for view in views {
+        for picture in view.predicted {
+            pictures.set_item(view.id.as_str(), triples(py, picture, |SrgbRgb(rgb)| rgb.map(byte_from_unit))?)?;
+        }
+    }
+    Ok(pictures)
 }

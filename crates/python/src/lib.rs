@@ -11,7 +11,6 @@ mod baselines;
 mod dataset;
 mod instance;
 mod long_work;
-mod render;
 mod reports;
 mod submission;
 mod view;
@@ -30,13 +29,11 @@ mod _core {
     #[pymodule_export]
     use crate::baselines::{Delit, Maps, delight, lift, procedural};
     #[pymodule_export]
-    use crate::dataset::{Dataset, Scene};
+    use crate::dataset::{Dataset, Scene, render};
     #[pymodule_export]
     use crate::instance::{Instance, Mesh, Part};
     #[pymodule_export]
     use crate::main;
-    #[pymodule_export]
-    use crate::render::render;
     #[pymodule_export]
     use crate::reports::{lint, lpips, psnr, rank, read_result, score, ssim, tables};
     #[pymodule_export]

@@ -443,6 +443,8 @@ def test_a_scene_is_rendered_with_any_maps(scene, nn, scores):
     assert not np.array_equal(scene.render(nn, light="warm_cool", samples=1)["input"], ours["input"])
     with pytest.raises(ValueError, match="light: expected 'true', 'warm_cool'"):
         scene.render(nn, light="sun")
+    with pytest.raises(ValueError, match="light: scene 'room' has no lighting 'alone_9'"):
+        scene.render(nn, light="alone_9", samples=1)
 
 
 def test_exceptions_speak_python(dataset, nn):

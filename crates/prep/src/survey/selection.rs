@@ -138,7 +138,7 @@ fn not_chosen(house_is_full: bool, goal: &SelectionGoal) -> String {
         true => format!("its house has given {}, the most of one house", counted(goal.per_house, "scene")),
         false => {
             format!(
-                "{} were chosen, each of which was nearer to the goal or has a better rank",
+                "{} were chosen, and each was nearer to the goal or has a better rank",
                 counted(goal.scenes, "scene")
             )
         }

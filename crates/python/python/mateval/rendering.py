@@ -25,7 +25,7 @@ def render(
 ) -> dict[str, npt.NDArray[np.uint8]]:
     """Renders maps as a submission that holds nothing else is rendered."""
     if isinstance(maps, (str, os.PathLike)):
-        return _core.render(scene, maps, light, samples, progress)[0]
+        return _core.render(scene, maps, light, samples, progress)
     if not isinstance(maps, Mapping):
         raise TypeError(f"maps: expected a dictionary by instance or a submission's folder, found {type(maps).__name__}")
     root, _ = scene.__reduce__()[1]
@@ -37,4 +37,4 @@ def render(
                 given = {name: get(name) for name in MAPS if get(name) is not None}
                 if given:
                     submission.write(scene.id, instance, **given)
-        return _core.render(scene, out, light, samples, progress)[0]
+        return _core.render(scene, out, light, samples, progress)
