@@ -42,7 +42,8 @@ class WholeRun(unittest.TestCase):
     def test_an_installed_module_is_kept(self) -> None:
         self.environment(script="exit 0", mark=WANTED)
         with mock.patch.object(tool, "install") as install:
-            self.assertEqual(self.run_tool(), (0, f"{self.folder / 'bin/python'}\n", ""))
+            note = f"already present: Blender 4.5 in '{self.folder}'\n"
+            self.assertEqual(self.run_tool(), (0, f"{self.folder / 'bin/python'}\n", note))
         install.assert_not_called()
 
     def test_an_incomplete_and_another_installation_are_made_anew(self) -> None:

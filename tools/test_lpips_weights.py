@@ -193,7 +193,7 @@ class WholeRun(unittest.TestCase):
     def test_an_existing_file_is_not_written_again(self) -> None:
         code, out, err = self.run_tool("--lpips-archive", str(self.sdist))
         path = self.folder / "out" / "tiny.safetensors"
-        self.assertEqual((code, err), (0, ""))
+        self.assertEqual((code, err), (0, f"unpacked: '{path}'\n"))
         self.assertEqual(out, f"{tool.NETS[0].sha256}  {path}\n")
         self.assertEqual(path.read_bytes(), self.content)
         self.assertEqual([p.name for p in path.parent.iterdir()], ["tiny.safetensors"])

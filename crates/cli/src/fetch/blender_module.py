@@ -151,15 +151,16 @@ def check_import(*, python: str) -> None:
 def fetch(*, cache: Path, requirements: str) -> Path:
     """Installs Blender unless it is installed, and returns the Python that has it."""
     folder = cache / "blender"
-    if is_installed(folder=folder, requirements=requirements):
-        print(f"already present: Blender 4.5 in '{folder}'", file=sys.stderr)
-    else:
+    present = is_installed(folder=folder, requirements=requirements)
+    if not present:
         install(folder=folder, requirements=requirements)
     python = folder / "bin" / "python"
     try:
         check_import(python=str(python))
     except FetchError as problem:
         raise FetchError(f"downloaded into '{folder}', but {problem}") from None
+    if present:
+        print(f"already present: Blender 4.5 in '{folder}'", file=sys.stderr)
     return python
 
 
