@@ -3,7 +3,7 @@
 # tools/test_site.sh test_site.TestBoard. `test_docs` tests the site of the documentation, which tools/docs.sh builds.
 set -eu
 cd "$(dirname "$0")/.."
-tools/apt_install.sh chromium fonts-dejavu-core
+tools/apt_install.sh chromium fonts-dejavu-core minisign
 # Installs three.js and axe-core, too, which the tests use.
 tools/build_viewer.sh --check
 # Built with the tests' profile, so that nothing is compiled twice.

@@ -477,6 +477,7 @@ fn white(values: impl Iterator<Item = f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use mateval_image::exr_io::{Precision, write_linear};
+    use mateval_testkit::packed::{turned_jpeg, upright_jpeg};
 
     use super::*;
 
@@ -632,19 +633,12 @@ mod tests {
         assert_eq!(remarks(folder.path(), Map::BaseColor), []);
     }
 
-    /// A JPEG whose EXIF data states orientation 6, as telephones write it.
     #[test]
     fn a_turned_picture_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let mut jpeg = Vec::new();
-        let encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
-        image::ImageEncoder::write_image(encoder, &[90; 16 * 8 * 3], 16, 8, image::ExtendedColorType::Rgb8).unwrap();
-        std::fs::write(folder.path().join("a.jpg"), &jpeg).unwrap();
+        std::fs::write(folder.path().join("a.jpg"), upright_jpeg()).unwrap();
         assert!(read(folder.path(), "a.jpg", "").is_ok());
-        let tiff = [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0".as_slice(), &[0; 4]].concat();
-        let length = u16::try_from(2 + 6 + tiff.len()).unwrap().to_be_bytes();
-        jpeg.splice(2..2, [&[0xff, 0xe1][..], &length, b"Exif\0\0", &tiff].concat());
-        std::fs::write(folder.path().join("a.jpg"), &jpeg).unwrap();
+        std::fs::write(folder.path().join("a.jpg"), turned_jpeg()).unwrap();
         assert!(read(folder.path(), "a.jpg", "").unwrap_err().to_string().contains("EXIF"));
     }
 

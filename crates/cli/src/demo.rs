@@ -30,6 +30,7 @@ use mateval_prep::build::finish::finish_again;
 use mateval_prep::build::{BuildOptions, build};
 use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
 use mateval_report::leaderboard::entries::ResultsFolder;
+use mateval_report::leaderboard::marks::TrustedKeys;
 use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
 use mateval_report::strips::Shown;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables};
@@ -408,7 +409,8 @@ fn results_and_ceiling(places: &Places, options: &Options) -> (Vec<DemoBaseline>
 fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
     let (ranked, ceiling) = results_and_ceiling(places, options);
     let results = ranked.iter().map(|baseline| places.result(*baseline)).collect();
-    let entries = entries::read(&ResultsFolder { results, ceiling, errata: None })?;
+    let entries =
+        entries::read(&ResultsFolder { results, ceiling, ..ResultsFolder::default() }, &TrustedKeys::default())?;
     let samples = SHOWN_SAMPLES.min(options.samples);
     let plan = LeaderboardPlan {
         results: &entries.results,

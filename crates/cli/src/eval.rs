@@ -11,8 +11,11 @@ use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
+use mateval_files::work_folder;
 use mateval_metrics::{Lpips, Net};
+use mateval_report::leaderboard::marks;
 use mateval_report::pair::{PairValues, compare};
+use mateval_report::release::file::Day;
 use mateval_submission::SubmissionError;
 use mateval_submission::archive::Opened;
 use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
@@ -21,6 +24,7 @@ use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs};
 use crate::TOOL;
 use crate::arguments::{Format, check_output_file, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
+use crate::key::today;
 use crate::terminal::{Outcome, print, print_fitted, say_findings, with_progress};
 
 /// Subcommands of `eval`.
@@ -235,6 +239,13 @@ pub struct VerifyArgs {
     /// folder.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// A secret key, as `mateval key new` writes it, to sign the verification with: the signature lies beside `--out`,
+    /// with the ending .minisig.
+    #[arg(long, value_name = "KEY", requires = "out")]
+    sign: Option<PathBuf>,
+    /// The day that the signature states [default: today, in UTC].
+    #[arg(long, requires = "sign")]
+    date: Option<Day>,
     /// Number of scenes that are scored at once.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     jobs: u8,
@@ -250,6 +261,8 @@ impl VerifyArgs {
     /// Scores again and compares; the answer is no where a number differs.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         self.out.iter().try_for_each(|out| check_output_file(out, "--out", "verification", self.force))?;
+        // A key that cannot be read is found before anything is scored.
+        let key = self.sign.as_deref().map(marks::secret_key).transpose()?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
         let opened = open_submission(&self.submission)?;
         let plan = VerifyPlan {
@@ -261,7 +274,14 @@ impl VerifyArgs {
             jobs: usize::from(self.jobs),
         };
         let found = with_progress(|progress| verify(plan, progress)).context("cannot verify")?;
-        self.out.iter().try_for_each(|out| json::write(out, &found))?;
+        if let Some(out) = &self.out {
+            json::write(out, &found)?;
+            // A signature of an earlier verification must not stay beside this one.
+            work_folder::remove(&marks::signature_of(out))?;
+            if let Some(key) = &key {
+                marks::sign(out, key, &String::from(self.date.clone().unwrap_or_else(today)))?;
+            }
+        }
         match self.format {
             Format::Json => print(&json::to_text(&found))?,
             Format::Text => print_fitted(&verification_text(&found))?,

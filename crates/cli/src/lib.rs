@@ -14,6 +14,7 @@ mod demo;
 mod eval;
 mod fetch;
 mod graph;
+mod key;
 mod prep;
 mod terminal;
 
@@ -57,6 +58,9 @@ enum Command {
     /// Lists, checks and renders procedural materials: graphs of MaterialX nodes.
     #[command(subcommand)]
     Graph(graph::Command),
+    /// Makes the keys with which a board's keeper marks results as verified.
+    #[command(subcommand)]
+    Key(key::Command),
     /// Downloads LPIPS' weights and Blender, which are not part of the tool.
     Fetch(fetch::FetchArgs),
     /// Prints the completions of a shell: `mateval completions bash > ~/.local/share/bash-completion/completions/mateval`.
@@ -149,6 +153,7 @@ fn carry_out(command: &Command) -> anyhow::Result<Outcome> {
         Command::Baseline(command) => baseline::run(command),
         Command::Eval(command) => eval::run(command),
         Command::Graph(command) => graph::run(command),
+        Command::Key(command) => key::run(command),
         Command::Fetch(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();

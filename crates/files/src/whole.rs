@@ -4,6 +4,7 @@
 //! `.NAME.HOST-PROCESS-START-COUNT.partial`.
 
 use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
@@ -14,11 +15,21 @@ use crate::owner::Owner;
 /// Writes `bytes` to `path`, replacing an existing file. `path` never holds a half-written file, and of several
 /// processes that write it at once the last one's bytes stay, whole.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_with(path, bytes, std::fs::File::options().write(true).create_new(true))
+}
+
+/// Like [`write_whole`], as a file that only its owner can read and write.
+pub fn write_private(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_with(path, bytes, std::fs::File::options().write(true).create_new(true).mode(0o600))
+}
+
+fn write_with(path: &Path, bytes: &[u8], options: &std::fs::OpenOptions) -> Result<(), FileError> {
     let refused = FileError::io("write", path);
     let Some(partial) = beside(path) else {
         return Err(refused(std::io::ErrorKind::InvalidFilename.into()));
     };
-    let written = std::fs::File::create(&partial)
+    let written = options
+        .open(&partial)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_data()))
         .and_then(|()| std::fs::rename(&partial, path));
     written.map_err(|source| {

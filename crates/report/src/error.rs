@@ -46,6 +46,9 @@ pub enum ReportError {
     /// The dataset has no ground truth that could be withheld.
     #[error("'{}' has no ground truth to withhold", path.display())]
     NoGroundTruth { path: PathBuf },
+    /// A key or signature in a file cannot be read or used.
+    #[error("'{}' is not a key as `mateval key new` and minisign write it, or has a password: {reason}", path.display())]
+    BadKey { path: PathBuf, reason: String },
     #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
     NothingToShow {
         protocol: String,

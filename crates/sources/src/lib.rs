@@ -7,7 +7,7 @@
 //!
 //! [`bitterli`] reads XML. [`front3d`] reads a house's JSON, furnishes its rooms and draws cameras. [`gltf`] reads glTF
 //! files of any tool. They begin with `open`, which opens the main file, and share [`source_scene`], `log`, which
-//! collects findings, [`surface_mesh`], which repairs meshes and splits them into parts, `primitives`, `missing_uv` and
+//! collects findings, [`surface_mesh`], which repairs meshes and splits them into parts, `primitives`, `uv` and
 //! `coincident`.
 
 pub mod bitterli;
@@ -17,10 +17,10 @@ mod fallbacks;
 pub mod front3d;
 pub mod gltf;
 mod log;
-mod missing_uv;
 mod open;
 mod primitives;
 pub mod source_scene;
 pub mod surface_mesh;
+mod uv;
 
 pub use open::SourceError;

@@ -9,7 +9,7 @@ use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, LookedFor, SourceFolder};
-use mateval_image::texture_io::FewerBits;
+use mateval_image::texture_io::{FewerBits, is_turned};
 use mateval_image::{ImageError, Texels, Texture};
 
 use crate::log::Log;
@@ -138,6 +138,15 @@ pub(crate) fn picture_fault(code: &'static str, error: &ImageError) -> FileFault
     FileFault { code, message }
 }
 
+/// Reports a texture that viewers of photos turn. Blender and Mitsuba do not; browsers do.
+pub(crate) fn report_turned(bytes: &[u8], file: &str, place: &str, log: &mut Log) {
+    if is_turned(bytes) {
+        let message = "its EXIF data states that it should be turned or mirrored";
+        let action = "used it as it is stored, as Blender and Mitsuba do; save it without EXIF data";
+        log.push(Severity::Warning, "turned_texture", file, place, message, action);
+    }
+}
+
 /// Beyond this, a number of a colour texture is no reflectance, and below 0 it is none either.
 const MOST_REFLECTANCE: f32 = 1.05;
 /// A texture of floats whose largest number is smaller is black by mistake.
@@ -194,6 +203,8 @@ pub(crate) fn shift_transform(shift: DVec3) -> DMat4 {
 
 #[cfg(test)]
 mod tests {
+    use mateval_testkit::packed::{turned_jpeg, upright_jpeg};
+
     use super::*;
 
     #[test]
@@ -210,6 +221,17 @@ mod tests {
             [None, None, None, None]
         );
         assert_eq!([of(Texels::Srgb8(vec![[1; 3]; 2])), of(Texels::Srgb16(vec![[65535; 3]; 2]))], [None, None]);
+    }
+
+    #[test]
+    fn textures_that_viewers_turn_are_found() {
+        let found = |bytes: &[u8]| {
+            let mut log = Log::new("a.gltf".to_owned(), 10);
+            report_turned(bytes, "a.jpg", "/images/0", &mut log);
+            log.into_findings().into_iter().map(|finding| (finding.code, finding.file)).collect::<Vec<_>>()
+        };
+        assert_eq!(found(&turned_jpeg()), [("turned_texture".to_owned(), "a.jpg".to_owned())]);
+        assert_eq!(found(&upright_jpeg()), []);
     }
 
     #[test]

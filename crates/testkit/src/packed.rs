@@ -1,4 +1,4 @@
-//! Valid and invalid archives, written byte by byte.
+//! Valid and invalid archives, and a photo of a telephone, written byte by byte.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -23,6 +23,26 @@ pub struct ZipEntry {
     pub comment: Vec<u8>,
     /// The entry whose data it points to; none for data of its own.
     pub shares: Option<usize>,
+}
+
+/// A grey JPEG of 16 by 8 pixels, as telephones write it: its EXIF data states orientation 6, a turn by 90 degrees.
+pub fn turned_jpeg() -> Vec<u8> {
+    let mut jpeg = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
+    image::ImageEncoder::write_image(encoder, &[90; 16 * 8 * 3], 16, 8, image::ExtendedColorType::Rgb8).unwrap();
+    // APP1 with a little-endian TIFF header and one entry: tag 0x0112, type SHORT, count 1, value 6.
+    let tiff = [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0".as_slice(), &[0; 4]].concat();
+    let length = u16::try_from(2 + 6 + tiff.len()).unwrap().to_be_bytes();
+    jpeg.splice(2..2, [&[0xff, 0xe1][..], &length, b"Exif\0\0", &tiff].concat());
+    jpeg
+}
+
+/// The same JPEG without EXIF data.
+pub fn upright_jpeg() -> Vec<u8> {
+    let mut jpeg = turned_jpeg();
+    let length = 2 + usize::from(u16::from_be_bytes([jpeg[4], jpeg[5]]));
+    jpeg.drain(2..2 + length);
+    jpeg
 }
 
 /// The checksum of zip and gzip.

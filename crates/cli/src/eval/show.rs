@@ -12,7 +12,8 @@ use mateval_eval::protocol::Track;
 use mateval_eval::result::ResultFile;
 use mateval_report::explain::{self, ExplainPlan};
 use mateval_report::leaderboard::entries::ResultsFolder;
-use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, write};
+use mateval_report::leaderboard::marks::{TrustedKeys, Verified};
+use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, marks, write};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_submission::archive::Opened;
@@ -246,7 +247,8 @@ impl PicturesArgs {
 
 #[derive(clap::Args)]
 pub struct LeaderboardArgs {
-    /// RESULT.json files. One is marked as verified if RESULT.verified.json, written by `eval verify`, lies beside it.
+    /// RESULT.json files. One is marked as verified if RESULT.verified.json lies beside it and a key that `--trust`
+    /// names has signed it; all others are shown as claimed.
     #[arg(required_unless_present = "from", value_name = "RESULT.json")]
     results: Vec<PathBuf>,
     /// Folder of results, as collected by pull requests: every .json file in it and in the folders below it. In the
@@ -256,6 +258,9 @@ pub struct LeaderboardArgs {
     /// RESULT.json of the truth itself (`mateval baseline gt`), shown below the methods as the ceiling of each column.
     #[arg(long, value_name = "RESULT.json")]
     ceiling: Option<PathBuf>,
+    /// A public key, as `mateval key new` writes it, whose verifications count; may be given several times.
+    #[arg(long, value_name = "KEY.pub")]
+    trust: Vec<PathBuf>,
     /// Folder of the site; its index.html opens from the disk.
     #[arg(long)]
     out: PathBuf,
@@ -295,16 +300,23 @@ impl LeaderboardArgs {
                 results: self.results.clone(),
                 ceiling: self.ceiling.clone(),
                 errata: self.errata.clone(),
+                skipped: Vec::new(),
             },
         };
-        let entries = entries::read(&files)?;
-        let marked = files.results.iter().zip(&entries.verified);
-        for (path, _) in marked.filter(|(_, mark)| **mark == entries::Verified::Stale) {
-            let sidecar = entries::sidecar(path);
-            say(&format!(
-                "warning: '{}' verifies an earlier version of the result; run `eval verify` again",
-                sidecar.display()
-            ));
+        for path in &files.skipped {
+            say(&format!("note: skipped '{}', whose name is that of a hidden or left-over file", path.display()));
+        }
+        let entries = entries::read(&files, &TrustedKeys::read(&self.trust)?)?;
+        for (path, mark) in files.results.iter().zip(&entries.verified) {
+            let sidecar = marks::sidecar(path);
+            let why = match mark {
+                Verified::Stale => "verifies an earlier version of the result; run `eval verify` again",
+                Verified::Claimed if sidecar.exists() => {
+                    "has no signature of a key that --trust names, and does not count; the result is shown as claimed"
+                }
+                Verified::Claimed | Verified::Confirmed | Verified::Refuted => continue,
+            };
+            say(&format!("warning: '{}' {why}", sidecar.display()));
         }
         let dataset = self.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;

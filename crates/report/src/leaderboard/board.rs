@@ -7,8 +7,9 @@ use mateval_eval::result::{ProtocolResult, ResultFile};
 use serde::Serialize;
 
 use super::columns::{self, Column, MethodHead, standing};
-use super::entries::{LeaderboardPlan, Verified};
+use super::entries::LeaderboardPlan;
 use super::file::{Ceiling, LEADERBOARD_FORMAT, LeaderboardFile, LeaderboardMethod};
+use super::marks::Verified;
 use super::pictures::{ERROR, PictureSet, TRUTH, png_size};
 use super::rooms::{Room, Rooms};
 use super::site::SiteWriter;

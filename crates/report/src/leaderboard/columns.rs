@@ -7,8 +7,8 @@ use mateval_eval::result::key::{ResultKey, Surfaces, Views};
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use serde::Serialize;
 
-use super::entries::Verified;
 use super::file::LeaderboardMethod;
+use super::marks::Verified;
 use crate::ranking::file::{RankRange, RankedMethod, Ranking, Standing};
 
 #[derive(Clone, Serialize)]
@@ -147,7 +147,8 @@ pub(super) fn choices(columns: &[Column]) -> Choices {
 
 /// The columns that hold no scores, from left to right, behind those that do: what is known about a method besides its
 /// numbers. A new column is one entry.
-pub(super) const FACTS: [FactColumn; 2] = [
+pub(super) const FACTS: [FactColumn; 3] = [
+    FactColumn { key: "numbers", title: "Numbers", is_word: true, of: numbers },
     FactColumn { key: "cost", title: "Seconds a scene", is_word: false, of: cost },
     FactColumn { key: "licence", title: "Licence", is_word: true, of: licence },
 ];
@@ -179,6 +180,16 @@ pub(super) struct Fact {
 /// A method's cells, one for each of [`FACTS`].
 pub(super) fn facts(method: &LeaderboardMethod, scores: &ProtocolResult) -> Vec<Option<Fact>> {
     FACTS.iter().map(|column| (column.of)(method, scores)).collect()
+}
+
+fn numbers(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
+    let (text, note) = match method.verified {
+        Verified::Claimed => ("claimed", ""),
+        Verified::Confirmed => ("verified", ""),
+        Verified::Refuted => ("refuted", "other numbers were computed"),
+        Verified::Stale => ("claimed", "changed since they were verified"),
+    };
+    Some(Fact { value: text.to_owned(), text: text.to_owned(), note: note.to_owned() })
 }
 
 fn cost(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {

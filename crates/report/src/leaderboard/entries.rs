@@ -1,22 +1,24 @@
 //! What a board is made from: the files of a folder of results, read and checked. All files are checked before any is
 //! refused, so that the error lists everything that must change.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{Finding, SceneError, Severity, json};
-use mateval_eval::result::key::{Region, Surfaces};
+use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
+use mateval_eval::metric::Metric;
+use mateval_eval::protocol::Track;
+use mateval_eval::result::key::{Region, ResultKey, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
-use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
 use mateval_files::FileError;
-use mateval_files::untrusted::{sha256_of_file, shortened};
+use mateval_files::untrusted::{nearest, shortened};
 use mateval_submission::lint::submission_json::check_method_name;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::marks::{TrustedKeys, Verified, sidecar};
 use crate::error::{ReportError, fitting};
 use crate::ranking::file::Ranking;
 use crate::strips::Shown;
@@ -32,13 +34,15 @@ pub const ERRATA_FORMAT: &str = "mateval-errata/1";
 
 /// What to do with a file that is not what a board expects in its place.
 const UNFIT: &str = "correct it, or leave it out: a folder of results holds NAME.json as `mateval eval score --out` \
-                     writes it, NAME.verified.json as `mateval eval verify --out` writes it, and in the folder itself \
+                     writes it, NAME.verified.json as `mateval eval verify --out` writes it, its \
+                     signature NAME.verified.json.minisig, and in the folder itself \
                      ceiling.json, a result, and errata.json";
 
 /// The files of a folder in which a leaderboard's results are collected, for example by pull requests.
 ///
 /// `ceiling.json` and `errata.json` lie in the folder itself. Every other `.json` file, there or in a folder directly
 /// below it (for example one for each method), is a result or, if it ends in `.verified.json`, the verification of one.
+/// Hidden files and those that systems leave behind are skipped.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ResultsFolder {
     /// The files of the methods' results, sorted; at least one if the folder was listed.
@@ -46,6 +50,19 @@ pub struct ResultsFolder {
     /// The file of the truth's result.
     pub ceiling: Option<PathBuf>,
     pub errata: Option<PathBuf>,
+    /// `.json` files and folders that are skipped because of their names.
+    pub skipped: Vec<PathBuf>,
+}
+
+/// Whether a name is hidden, or one that systems and editors leave behind: none of them is anybody's result.
+fn is_litter(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with('.') || name.ends_with('~') || name == "__MACOSX"
+}
+
+/// Whether a name ends in `.json`, in letters of any case.
+fn is_json(name: &str) -> bool {
+    name.to_ascii_lowercase().ends_with(".json")
 }
 
 impl ResultsFolder {
@@ -56,6 +73,7 @@ impl ResultsFolder {
         let mut folders = Vec::new();
         for (path, kind) in entries_of(folder)? {
             match path.file_name().and_then(|name| name.to_str()) {
+                name if is_litter(&path) => found.skip(name, path.clone(), kind),
                 _ if kind.is_dir() => folders.push(path),
                 Some(CEILING) => found.ceiling = Some(regular_file(path, kind)?),
                 Some(ERRATA) => found.errata = Some(regular_file(path, kind)?),
@@ -64,21 +82,31 @@ impl ResultsFolder {
         }
         for folder in folders {
             for (path, kind) in entries_of(&folder)? {
-                found.add(path.file_name().and_then(|name| name.to_str()), path.clone(), kind)?;
+                match path.file_name().and_then(|name| name.to_str()) {
+                    name if is_litter(&path) => found.skip(name, path.clone(), kind),
+                    name => found.add(name, path.clone(), kind)?,
+                }
             }
         }
         if found.results.is_empty() {
             return Err(ReportError::NoResultsBelow { folder: folder.to_owned() });
         }
         found.results.sort();
+        found.skipped.sort();
         Ok(found)
+    }
+
+    fn skip(&mut self, name: Option<&str>, path: PathBuf, kind: std::fs::FileType) {
+        // A folder of a version control system holds no results, and need not be named.
+        let may_be_missed = if kind.is_dir() { name != Some(".git") } else { name.is_some_and(is_json) };
+        self.skipped.extend(may_be_missed.then_some(path));
     }
 
     /// Adds the file if its name is that of a result. Fails where it or a verification is a link.
     fn add(&mut self, name: Option<&str>, path: PathBuf, kind: std::fs::FileType) -> Result<(), ReportError> {
-        let Some(name) = name.filter(|name| name.ends_with(".json") && !kind.is_dir()) else { return Ok(()) };
+        let Some(name) = name.filter(|name| is_json(name) && !kind.is_dir()) else { return Ok(()) };
         let path = regular_file(path, kind)?;
-        if !name.ends_with(".verified.json") {
+        if !name.to_ascii_lowercase().ends_with(".verified.json") {
             self.results.push(path);
         }
         Ok(())
@@ -99,18 +127,21 @@ pub struct Entries {
 /// Reads the files. Fails with every reason for which they cannot make a board: a file is something else, a board
 /// cannot show the name of a method, or two results have the same name or submission. A file that the system does not
 /// let us read is the only reason then.
-pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
+pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, ReportError> {
     let (mut entries, mut paths, mut findings) = (Entries::default(), Vec::new(), Vec::new());
     for path in &files.results {
         let Some(result) = read_result(path, &mut findings)? else { continue };
         let sidecar = sidecar(path);
-        let mark = fitting(verification_of(path, &result), "a verification", &sidecar, UNFIT, &mut findings)?;
-        entries.verified.push(mark.unwrap_or(Verified::No));
+        let mark = fitting(trust.mark(path, &result), "a verification", &sidecar, UNFIT, &mut findings)?;
+        entries.verified.push(mark.unwrap_or(Verified::Claimed));
         entries.results.push(result);
         paths.push(path.as_path());
     }
     if let Some(path) = &files.ceiling {
-        entries.ceiling = read_result(path, &mut findings)?;
+        if let Some(result) = read_result(path, &mut findings)? {
+            findings.extend(not_the_truth(path, &result, trust));
+            entries.ceiling = Some(result);
+        }
     }
     if let Some(path) = &files.errata {
         entries.errata = fitting(ErrataFile::read(path), "errata", path, UNFIT, &mut findings)?;
@@ -119,6 +150,9 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
     let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
     let names = shown.iter().map(|name| name.trim());
     findings.extend(repeated(&paths, names, "name", "/method", "give each method its own name, or leave one out"));
+    if let (Some(errata), Some(path)) = (&entries.errata, &files.errata) {
+        findings.extend(unknown_names(path, errata, results));
+    }
     let hashes = results.iter().map(|result| result.submission.sha256.as_str());
     let action = "a submission is ranked once: leave one out";
     findings.extend(repeated(&paths, hashes, "submission", "/submission/sha256", action));
@@ -160,20 +194,6 @@ impl Submissions<'_> {
     }
 }
 
-/// Whether a result was verified.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Verified {
-    /// It was not verified.
-    No,
-    /// `eval verify` computed the same numbers.
-    Confirmed,
-    /// `eval verify` computed different numbers.
-    Refuted,
-    /// The verification belongs to other bytes: the result, or what it was made from, has changed since.
-    Stale,
-}
-
 /// Errata, in the order in which they are shown.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -206,26 +226,44 @@ impl ErrataFile {
     }
 }
 
-/// `DIR/NAME.verified.json` of `DIR/NAME.json`.
-pub fn sidecar(result: &Path) -> PathBuf {
-    result.with_extension("verified.json")
+/// Why a result cannot be the ceiling. Renders of the truth's own maps are equal to the reference in every bit.
+fn not_the_truth(path: &Path, result: &ResultFile, trust: &TrustedKeys) -> Option<Finding> {
+    let action = "score the submission of `mateval baseline gt`, or leave the ceiling out";
+    let is_inexact =
+        |(key, value): (&ResultKey, &f64)| key.metric == Metric::Mse && key.picture.kind.is_light() && *value != 0.0;
+    let inexact = result.protocols.iter().find_map(|(name, scores)| {
+        // The light of `paper` is fitted to the photo, which another program may have rendered.
+        let is_exact = scores.protocol.light.tracks.contains(&Track::True);
+        scores.summary.iter().find(|entry| is_exact && is_inexact(*entry)).map(|(key, value)| (name, key, value))
+    });
+    if let Some((name, key, value)) = inexact {
+        let message = format!("this is not the truth: the ceiling's {key} is 0, found {value:?}");
+        return Some(error("not_the_truth", path, &format!("/protocols/{name}/summary/{key}"), message, action));
+    }
+    let is_signed = || trust.mark(path, result).is_ok_and(|mark| mark == Verified::Confirmed);
+    if trust.is_empty() || is_signed() {
+        return None;
+    }
+    let message = "the ceiling has no verification that a trusted key signed".to_owned();
+    let action = "verify it with `mateval eval verify --sign KEY`, as the other results";
+    Some(error("unverified_ceiling", path, "/method", message, action))
 }
 
-/// The state that the sidecar of the result in the file `path` gives; `result` is the content of that file.
-pub(super) fn verification_of(path: &Path, result: &ResultFile) -> Result<Verified, ReportError> {
-    let sidecar = sidecar(path);
-    if !sidecar.exists() {
-        return Ok(Verified::No);
+/// A finding for each name in the errata that no result has: of no method, and of no scene.
+fn unknown_names(path: &Path, errata: &ErrataFile, results: &[ResultFile]) -> Vec<Finding> {
+    let methods: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
+    let scenes = results.iter().flat_map(|result| &result.dataset.scenes).map(SceneId::as_str);
+    let known: BTreeSet<&str> = methods.iter().map(String::as_str).chain(scenes).collect();
+    let mut findings = Vec::new();
+    for (at, erratum) in errata.entries.iter().enumerate() {
+        for (number, name) in erratum.affects.iter().enumerate().filter(|(_, name)| !known.contains(name.as_str())) {
+            let meant = nearest(name, known.iter().copied()).map(|name| format!("; did you mean '{name}'?"));
+            let message = format!("no method or scene is named '{}'{}", shortened(name), meant.unwrap_or_default());
+            let place = format!("/entries/{at}/affects/{number}");
+            findings.push(error("unknown_name", path, &place, message, "write a name of the board, or leave it out"));
+        }
     }
-    let file: VerificationFile = json::read_format(&sidecar, VERIFICATION_FORMAT)?;
-    let is_of_these_bytes = file.result_sha256 == sha256_of_file(path)?
-        && file.submission_sha256 == result.submission.sha256
-        && file.dataset_manifest_sha256 == result.dataset.manifest_sha256;
-    Ok(match (is_of_these_bytes, file.confirmed) {
-        (false, _) => Verified::Stale,
-        (true, true) => Verified::Confirmed,
-        (true, false) => Verified::Refuted,
-    })
+    findings
 }
 
 /// The result in the file, if it is one; what is wrong with it or with its method's name is added to the findings.
@@ -309,7 +347,9 @@ mod tests {
 
     /// The faults of a folder of results: the file's name, the code and the place of each.
     fn faults(files: &ResultsFolder) -> Vec<(PathBuf, String, String)> {
-        let Err(ReportError::UnfitFiles(findings)) = read(files) else { panic!("expected findings") };
+        let Err(ReportError::UnfitFiles(findings)) = read(files, &TrustedKeys::default()) else {
+            panic!("expected findings")
+        };
         let name = |file: &str| PathBuf::from(Path::new(file).file_name().unwrap());
         findings.into_iter().map(|finding| (name(&finding.file), finding.code, finding.place)).collect()
     }
@@ -326,7 +366,7 @@ mod tests {
         let bad = |file: &str| fault(file, "bad_method_name", "/method");
         let expected = [bad("1.json"), bad("2.json"), bad("3.json"), fault("4.json", "no_method_name", "/method")];
         assert_eq!(faults(&files), expected);
-        let text = read(&files).unwrap_err().to_string();
+        let text = read(&files, &TrustedKeys::default()).unwrap_err().to_string();
         assert!(text.len() < 2000 && !text.contains('\u{202e}') && !text.contains('\0'), "{text}");
     }
 
@@ -334,7 +374,7 @@ mod tests {
     #[test]
     fn results_that_contradict_themselves_are_refused() {
         let (folder, files) = folder(&[("a", "1")]);
-        assert_eq!(read(&files).unwrap().results.len(), 1);
+        assert_eq!(read(&files, &TrustedKeys::default()).unwrap().results.len(), 1);
         let path = folder.path().join("0.json");
         let mut result: ResultFile = json::read(&path).unwrap();
         let summary = &mut result.protocols.get_mut("mateval-3").unwrap().summary;
@@ -352,7 +392,7 @@ mod tests {
         assert_eq!(faults(&files), expected);
         // The twin: other names and hashes.
         let (_folder, files) = folder(&[("a", "1"), ("b", "2")]);
-        assert_eq!(read(&files).unwrap().results.len(), 2);
+        assert_eq!(read(&files, &TrustedKeys::default()).unwrap().results.len(), 2);
     }
 
     #[test]
@@ -371,7 +411,7 @@ mod tests {
         let unfit = ["0.verified.json", "foreign.json", "package.json", "ceiling.json", "errata.json"];
         let found: Vec<PathBuf> = faults(&files).into_iter().map(|(file, ..)| file).collect();
         assert_eq!(found, unfit.map(PathBuf::from));
-        let text = read(&files).unwrap_err().to_string();
+        let text = read(&files, &TrustedKeys::default()).unwrap_err().to_string();
         assert!(text.contains("expected a result, found: the format 'mateval-lint/1'"), "{text}");
         assert!(text.contains("a folder of results holds") && !text.contains("prep verify"), "{text}");
     }

@@ -8,7 +8,7 @@ use mateval_eval::result::key::ResultKey;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::entries::Verified;
+use super::marks::Verified;
 use crate::ranking::file::Ranking;
 
 /// The format of this version of leaderboards.

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::board::{Board, Comparison, comparisons};
 use super::columns::{Cell, Column, MethodHead, headlines, shown, standing};
-use super::entries::Verified;
+use super::marks::Verified;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::ranking::file::Pair;
@@ -154,7 +154,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
 
 fn verified_text(verified: Verified) -> &'static str {
     match verified {
-        Verified::No => "not yet",
+        Verified::Claimed => "no: its numbers are claimed by those who submitted it",
         Verified::Confirmed => "yes: eval verify computed the same numbers",
         Verified::Refuted => "no: eval verify computed different numbers",
         Verified::Stale => "no: the result has changed since it was verified",

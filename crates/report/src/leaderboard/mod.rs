@@ -14,6 +14,7 @@ mod columns;
 mod curves;
 pub mod entries;
 pub mod file;
+pub mod marks;
 mod method_page;
 mod pictures;
 mod reference_pages;
@@ -103,11 +104,10 @@ mod tests {
     use mateval_dataset::json;
     use mateval_dataset::submission::Cost;
     use mateval_eval::result::{ResultFile, TracerCheck};
-    use mateval_files::untrusted::sha256_of_file;
     use mateval_image::{Picture, png_io};
 
-    use super::entries::{Verified, verification_of};
     use super::file::LeaderboardFile;
+    use super::marks::Verified;
     use super::*;
     use crate::ranking::tests::{result, scores};
 
@@ -124,7 +124,7 @@ mod tests {
         LeaderboardPlan {
             results,
             ceiling: None,
-            verified: vec![Verified::Confirmed, Verified::No, Verified::Stale],
+            verified: vec![Verified::Confirmed, Verified::Claimed, Verified::Stale],
             protocol: "mateval-3",
             partial: false,
             errata: None,
@@ -242,28 +242,5 @@ mod tests {
         std::fs::write(other.join("mine.txt"), "mine").unwrap();
         let error = write(&plan(&results), &other, true, &quiet).unwrap_err().to_string();
         assert!(error.contains("is not a leaderboard") && other.join("mine.txt").exists(), "{error}");
-    }
-
-    #[test]
-    fn verifications_hold_for_the_same_bytes_only() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.json");
-        let result = result("a", &scores(30.0, 0.0));
-        json::write(&path, &result).unwrap();
-        assert_eq!(verification_of(&path, &result).unwrap(), Verified::No);
-        let write_sidecar = |format: &str, result_sha256: &str, confirmed: bool| {
-            let file = serde_json::json!({
-                "format": format, "tool": "mateval", "result_sha256": result_sha256, "confirmed": confirmed, "differences": 0, "findings": [],
-                "submission_sha256": result.submission.sha256,
-                "dataset_manifest_sha256": result.dataset.manifest_sha256,
-            });
-            json::write(&entries::sidecar(&path), &file).unwrap();
-            verification_of(&path, &result)
-        };
-        let (format, sha256) = ("mateval-verification/1", sha256_of_file(&path).unwrap());
-        assert_eq!(write_sidecar(format, &sha256, true).unwrap(), Verified::Confirmed);
-        assert_eq!(write_sidecar(format, &sha256, false).unwrap(), Verified::Refuted);
-        assert_eq!(write_sidecar(format, &"0".repeat(64), true).unwrap(), Verified::Stale);
-        assert!(write_sidecar("mateval-verification/9", &sha256, true).is_err());
     }
 }

@@ -17,8 +17,8 @@ use mateval_image::{Texels, Texture, Wrap};
 use super::color::{CIE_Y_INTEGRAL, ColorUse, black_body, rec709_from_xyz};
 use super::document::Element;
 use super::reader::{COLORS, Parameters, Reader, rotation, vector};
-use crate::missing_uv::mean_color;
 use crate::primitives::{MapDisc, ROWS, texel_direction};
+use crate::uv::mean_color;
 
 /// The mean angular diameter of the sun in degrees, seen from the Earth.
 const SUN_DIAMETER_DEG: f64 = 0.5358;

@@ -28,10 +28,10 @@ use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, SceneLights};
 use mateval_files::untrusted::{hint, shortened, without_mark};
 
-use crate::coincident;
 use crate::log::{Log, UniqueNames};
 use crate::open::{Invalid, SourceError, open};
 use crate::source_scene::{FileScene, InstanceOrigin, Missing, is_optional, read_licence, report_shift, shift_of};
+use crate::{coincident, uv};
 use document::Document;
 pub use document::Limits;
 use reader::{Reader, Totals};
@@ -76,6 +76,7 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<F
     for (origin, surface) in origins.iter_mut().zip(&reader.scene.surfaces) {
         origin.stated = reader.stated[surface.material.0];
     }
+    uv::report_coarse(&reader.scene, &mut reader.log);
     coincident::separate(&mut reader.scene.surfaces, &mut origins, &mut reader.log);
     let Reader { scene, log, source, shift_m, left_out, .. } = reader;
     let files = source.into_files();

@@ -10,10 +10,10 @@ use mateval_files::untrusted::shortened;
 
 use super::document::Element;
 use super::reader::{Parameters, Reader};
-use crate::missing_uv::barycentric;
 use crate::primitives;
 use crate::source_scene::{shift_of, shift_transform};
 use crate::surface_mesh::{smooth_normals, to_world};
+use crate::uv::barycentric;
 
 const LEFT_OUT: &str = "left the shape out";
 

@@ -1,16 +1,18 @@
 //! Colour and number parameters: constants, or bitmaps read from files.
 
+use std::path::Path;
+
 use mateval_dataset::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_dataset::reference::SourceTexture;
 use mateval_files::source_folder::FileFault;
 use mateval_files::untrusted::shortened;
-use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
+use mateval_image::texture_io::{Encoding, read_alpha, texture_and_alpha_of_bytes};
 use mateval_image::{Texels, Texture, Wrap};
 
 use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;
 use super::reader::{Aspect, Parameters, Reader};
-use crate::source_scene::{other_range, picture_fault};
+use crate::source_scene::{other_range, picture_fault, report_turned};
 
 /// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
@@ -286,10 +288,11 @@ impl<'a> Reader<'a> {
         wrap: Wrap,
         alpha: bool,
     ) -> Result<Texture, FileFault> {
-        let path = self.source.path(file)?;
-        self.source.read(file)?;
-        let encoding = if linear { Encoding::Linear } else { Encoding::Srgb };
-        let texture = if alpha { read_alpha(&path, wrap) } else { read_texture(&path, encoding, wrap).map(Some) };
+        let bytes = self.source.read(file)?;
+        report_turned(&bytes, file, "", &mut self.log);
+        let encoding = if linear || alpha { Encoding::Linear } else { Encoding::Srgb };
+        let read = texture_and_alpha_of_bytes(Path::new(file), bytes, encoding, wrap);
+        let texture = read.map(|(color, opacity)| if alpha { opacity } else { Some(color) });
         let texture = texture
             .map_err(|error| {
                 // Without the folders of this machine.

@@ -1,6 +1,7 @@
 //! Materials of a house's surfaces and the textures that they use.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use mateval_dataset::Severity;
 use mateval_dataset::material::MaterialClass;
@@ -10,7 +11,7 @@ use mateval_dataset::material::{
 use mateval_dataset::reference::{MaterialIndex, SourceTexture};
 use mateval_files::source_folder::FileFault;
 use mateval_files::untrusted::shortened;
-use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texels, Texture, Wrap};
 
@@ -18,7 +19,7 @@ use super::house::{House, HouseMaterial};
 use super::material_class::{AppearanceRule, BLOCK, Finish, drawn};
 use super::model::{Library, is_folder_name};
 use crate::log::Log;
-use crate::source_scene::picture_fault;
+use crate::source_scene::{picture_fault, report_turned};
 
 /// Linear mid-grey, which replaces a colour or texture that cannot be read.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
@@ -133,7 +134,7 @@ impl Appearances {
         if let Some(known) = self.known_textures.get(&shown) {
             return *known;
         }
-        let index = match self.read(&relative, &shown, library) {
+        let index = match self.read(&relative, &shown, library, log) {
             Ok(texture) => {
                 self.textures.push(texture);
                 Some(TextureIndex(self.textures.len() - 1))
@@ -148,12 +149,17 @@ impl Appearances {
     }
 
     /// Reads a texture of the library.
-    fn read(&mut self, relative: &str, shown: &str, library: &mut Library) -> Result<SourceTexture, FileFault> {
-        // The folder reads the file for its hash, which the reader of pictures does not give.
+    fn read(
+        &mut self,
+        relative: &str,
+        shown: &str,
+        library: &mut Library,
+        log: &mut Log,
+    ) -> Result<SourceTexture, FileFault> {
         let code = |code| if code == "missing_file" { "missing_texture" } else { code };
-        library.folder.read(relative).map_err(|fault| FileFault { code: code(fault.code), ..fault })?;
-        let path = library.folder.path(relative)?;
-        let texture = read_texture(&path, Encoding::Srgb, Wrap::Repeat)
+        let bytes = library.folder.read(relative).map_err(|fault| FileFault { code: code(fault.code), ..fault })?;
+        report_turned(&bytes, shown, "", log);
+        let (texture, _) = texture_and_alpha_of_bytes(Path::new(shown), bytes, Encoding::Srgb, Wrap::Repeat)
             .map_err(|error| picture_fault("unreadable_texture", &error))?;
         self.texels = self.texels.saturating_add(texture.width() * texture.height());
         if self.texels > self.most_texels {

@@ -24,7 +24,7 @@ use crate::log::Log;
 use crate::open::{SourceError, open};
 use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::{Repairs, parts_of_labels, to_world};
-use crate::{coincident, missing_uv};
+use crate::{coincident, uv};
 
 /// The model of a piece of furniture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -128,9 +128,10 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     let Appearances { materials, textures, .. } = appearances;
     let mut scene = ReferenceScene { surfaces, materials, textures, lights: Vec::new() };
     let mut origins: Vec<InstanceOrigin> = placed.iter_mut().map(|placed| std::mem::take(&mut placed.origin)).collect();
-    for split in missing_uv::resolve(&mut scene, &mut origins, &mut log) {
+    for split in uv::resolve(&mut scene, &mut origins, &mut log) {
         placed.push(placed[split].clone());
     }
+    uv::report_coarse(&scene, &mut log);
     coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
     placed.iter_mut().zip(origins).for_each(|(placed, origin)| placed.origin = origin);
 

@@ -28,7 +28,7 @@ use mateval_dataset::reference::{Emission, LightGroup, ReferenceScene};
 use crate::log::{Log, UniqueNames};
 use crate::open::{Invalid, SourceError, open};
 use crate::source_scene::{FileScene, Missing, read_licence, report_shift, shift_of};
-use crate::{coincident, missing_uv};
+use crate::{coincident, uv};
 pub use document::Limits;
 use reader::{LEFT_OUT, Omission, Reader, report_omitted};
 
@@ -80,7 +80,8 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<FileS
     let lights = default_light(&mut reader);
     // Repairs that concern all of it.
     let Reader { mut scene, mut origins, mut log, omitted, source, aspect, .. } = reader;
-    missing_uv::resolve(&mut scene, &mut origins, &mut log);
+    uv::resolve(&mut scene, &mut origins, &mut log);
+    uv::report_coarse(&scene, &mut log);
     coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
     report_omitted(omitted, &mut log);
     let files = source.into_files();

@@ -14,8 +14,8 @@ use mateval_image::{ImageError, Texels, Texture, Wrap};
 
 use super::document::read_uri;
 use super::reader::{Aspect, Omission, Reader};
-use crate::missing_uv::mean_color;
-use crate::source_scene::{other_range, picture_fault};
+use crate::source_scene::{other_range, picture_fault, report_turned};
+use crate::uv::mean_color;
 
 #[derive(Clone)]
 pub(super) struct Lookup<'a> {
@@ -227,6 +227,7 @@ impl Reader<'_> {
         let sha256 = sha256_of_bytes(&bytes);
         let own_name = || image.name().map(shortened).unwrap_or_else(|| format!("image {}", image.index()));
         let name = file.unwrap_or_else(own_name);
+        report_turned(&bytes, &name, &format!("/images/{}", image.index()), &mut self.log);
         let read = texture_and_alpha_of_bytes(Path::new(&name), bytes, encoding, wrap);
         let (color, alpha) = read.map_err(|error| picture_fault("bad_image", &error))?;
         self.texels = self.texels.saturating_add(color.width() * color.height());

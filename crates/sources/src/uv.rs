@@ -1,11 +1,11 @@
-//! Faces without texture coordinates: absent, or NaN at one of their corners.
+//! Texture coordinates that are absent, NaN at a corner of a face, or too large for 32 bits.
 //!
-//! A texture has no place for such a face. Mitsuba uses barycentric coordinates ([`barycentric`]); for all other
+//! A texture has no place for a face without them. Mitsuba uses barycentric coordinates ([`barycentric`]); for all other
 //! sources the mean of the texture stands for it ([`resolve`]), so that no face takes the colour of an arbitrary texel.
 
 use std::collections::BTreeMap;
 
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::material::TextureIndex;
 use mateval_dataset::reference::{
@@ -69,6 +69,31 @@ pub(crate) fn resolve(scene: &mut ReferenceScene, origins: &mut Vec<InstanceOrig
         }
     }
     split
+}
+
+/// Beyond this many texels, neighbouring 32-bit numbers show a texture as blocks.
+const MOST_STEP_TEXELS: f64 = 0.5;
+
+/// Reports surfaces whose texture coordinates are so large that neighbouring numbers of 32 bits are texels apart.
+pub(crate) fn report_coarse(scene: &ReferenceScene, log: &mut Log) {
+    for surface in &scene.surfaces {
+        let uvs = surface.mesh.uvs.as_deref().unwrap_or_default();
+        let steps = scene.materials[surface.material.0].lookups().into_iter().map(|lookup| {
+            let texture = &scene.textures[lookup.texture.0].texture;
+            let moved = |uv: &Vec2| uv.abs().max(lookup.uv.apply(*uv).abs()).as_dvec2();
+            let largest = uvs.iter().map(moved).fold(DVec2::ZERO, DVec2::max);
+            let texels = largest * DVec2::new(texture.width() as f64, texture.height() as f64);
+            (largest.max_element(), texels.max_element() * f64::from(f32::EPSILON))
+        });
+        let worst = steps.max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((largest, step)) = worst.filter(|(_, step)| *step > MOST_STEP_TEXELS) {
+            let name = shortened(&surface.name);
+            let message = format!(
+                "texture coordinates of '{name}' reach {largest:.0}, where 32-bit numbers are up to {step:.1} texels apart"
+            );
+            log.warn("coarse_uv", "", message, "used them as they are; move them by whole tiles");
+        }
+    }
 }
 
 /// The light group of a surface that emits by a texture.
@@ -225,6 +250,21 @@ mod tests {
         // Twin.
         let (sound, findings) = resolved(rectangle().uvs);
         assert_eq!((sound.surfaces.len(), color(&sound, 0), findings), (1, [1.0; 3], 0));
+    }
+
+    #[test]
+    fn coordinates_that_are_texels_apart_are_found() {
+        let found = |scale: f32| {
+            let uvs = rectangle().uvs.unwrap().into_iter().map(|uv| uv * scale).collect();
+            let mut log = Log::new("a".to_owned(), 10);
+            report_coarse(&scene(Some(uvs)).0, &mut log);
+            log.into_findings()
+        };
+        // Numbers of 1e8 are 8 apart, tiles of 2 texels.
+        let far = found(1e8);
+        assert!(far[0].code == "coarse_uv" && far[0].message.contains("reach 100000000"), "{far:?}");
+        // Twin.
+        assert!(found(1e5).is_empty());
     }
 
     /// Mitsuba 3.9.1 on an OBJ of one triangle without vt.
