@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::{DatasetFile, DatasetVersion, FORMAT, SceneFile, TargetsFile, WideView};
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use crate::{Finding, RendererId, SceneError, SceneId, Severity, SourceKind, ViewId, json, manifest};
+use crate::{Finding, RendererId, SceneError, SceneId, Severity, SourceKind, ViewId, changes, json, manifest};
 
 /// A finished dataset on disk.
 #[derive(Clone, Debug)]
@@ -241,7 +241,7 @@ fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), Scen
     if findings.is_empty() {
         return Ok(());
     }
-    if let Some(error) = manifest::unfinished(root, |_| true) {
+    if let Some(error) = changes::unfinished(root, |_| true) {
         return Err(error);
     }
     let path = root.to_owned();

@@ -8,8 +8,8 @@ use mateval_image::{LinearRgb, Picture};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::changes::SceneHashes;
 use crate::layout::{is_input_picture, is_rendered};
-use crate::manifest::SceneHashes;
 use crate::{RendererId, SceneError, SceneId, ViewId};
 use mateval_files::untrusted::sha256_of_bytes;
 

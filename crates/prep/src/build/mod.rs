@@ -24,11 +24,11 @@ mod wide_views;
 
 use std::path::Path;
 
+use mateval_dataset::changes::SceneHashes;
 use mateval_dataset::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SourceFile};
 use mateval_dataset::glb::{self, GlbNode};
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::SceneFolder;
-use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::reference::Surface;
 use mateval_dataset::scene_cost::{self, Step, TimedStep};

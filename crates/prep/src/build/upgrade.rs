@@ -6,11 +6,10 @@
 
 use std::path::Path;
 
+use mateval_dataset::changes::{SceneHashes, change_scene};
 use mateval_dataset::dataset::{DatasetFile, FORMAT, PREVIOUS_FORMAT};
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::manifest;
-use mateval_dataset::manifest::SceneHashes;
-use mateval_dataset::manifest::change_scene;
 use mateval_dataset::open::check_whole;
 use mateval_dataset::{Progress, Report, SceneError, SceneId, json};
 use mateval_files::FileError;
