@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-use mateval_files::lease::{self, Lease};
+use mateval_files::lease::{Lease, LeaseSet};
 use mateval_files::untrusted::sha256_of_file;
 use mateval_files::whole::{is_temporary, write_whole};
 use mateval_files::{FileError, work_folder};
@@ -24,30 +24,13 @@ use crate::{Finding, SceneError, SceneId, json};
 impl BuildFolder {
     /// The right to change a scene. Fails where another process changes it or finishes the dataset.
     pub fn lease_of_scene(&self, scene: &SceneId) -> Result<Lease, SceneError> {
-        let (path, what) = self.scene_lease(scene);
-        let lease = Lease::take(&path, &what)?;
-        let (path, what) = self.whole_lease();
-        lease::check_free(&path, &what)?;
-        Ok(lease)
+        Ok(self.leases().part(scene.as_str())?)
     }
 
-    /// The right to write the files that describe the whole dataset. Fails where another process does so, or changes
-    /// one of its scenes.
+    /// The right to write the files that describe the whole dataset, or to replace it. Fails where another process does
+    /// so, or changes a scene. `scenes` are those that are known.
     pub fn lease_of_whole(&self, scenes: &[SceneId]) -> Result<Lease, SceneError> {
-        let (path, what) = self.whole_lease();
-        let lease = Lease::take(&path, &what)?;
-        for scene in scenes {
-            let (path, what) = self.scene_lease(scene);
-            lease::check_free(&path, &what)?;
-        }
-        Ok(lease)
-    }
-
-    /// The right to replace the dataset as a whole. Fails where another process works on anything of it.
-    pub fn lease_of_all(&self) -> Result<Lease, SceneError> {
-        let entries = std::fs::read_dir(self.path().join("leases/scenes")).into_iter().flatten().flatten();
-        let ids = entries.filter_map(|entry| SceneId::new(entry.file_name().to_str()?).ok());
-        self.lease_of_whole(&ids.collect::<Vec<_>>())
+        Ok(self.leases().whole(scenes.iter().map(SceneId::as_str))?)
     }
 
     /// The right to begin or change the build; waits for other processes, which need it for a moment.
@@ -60,12 +43,8 @@ impl BuildFolder {
         Ok(Lease::wait(&self.path().join("leases/verdict"), "the dataset's compare.json")?)
     }
 
-    fn scene_lease(&self, scene: &SceneId) -> (PathBuf, String) {
-        (self.path().join("leases/scenes").join(scene.as_str()), format!("scene '{scene}'"))
-    }
-
-    fn whole_lease(&self) -> (PathBuf, String) {
-        (self.path().join("leases/whole"), "the dataset's manifest".to_owned())
+    fn leases(&self) -> LeaseSet {
+        LeaseSet { folder: self.path().join("leases"), part: "scene", whole: "the dataset's manifest" }
     }
 
     /// Notes that the scene is about to differ from what the manifest lists.
