@@ -24,7 +24,7 @@ pub use values::{camera, findings, ids, material, mesh, uv_atlas};
 
 pub use camera::{Camera, Intrinsics};
 pub use dataset::{Role, SceneLights, SourceKind};
-pub use error::SceneError;
+pub use error::DatasetError;
 pub use findings::{Finding, FindingCount, Severity};
 pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;

@@ -9,7 +9,7 @@ use std::path::Path;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::Map;
-use mateval_dataset::{Finding, SceneError, SceneId, Severity};
+use mateval_dataset::{DatasetError, Finding, SceneId, Severity};
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{Texels, Texture, Wrap};
 
@@ -64,11 +64,11 @@ pub fn read_scene(
     submission: &Path,
     scene: &SceneFile,
     atlases: &AtlasMeshes<'_>,
-) -> Result<PredictedScene, SceneError> {
+) -> Result<PredictedScene, DatasetError> {
     let (memory, findings, files) = (MemoryBudget::of_scene(), Vec::new(), Vec::new());
     let mut reader = Reader { submission, scene, atlases, memory, findings, files };
     let instances = 0..scene.instances.len();
-    let materials = instances.map(|at| reader.material(at)).collect::<Result<Vec<_>, SceneError>>()?;
+    let materials = instances.map(|at| reader.material(at)).collect::<Result<Vec<_>, DatasetError>>()?;
     let Reader { findings, files, .. } = reader;
     Ok(PredictedScene { scattering_key: scattering_key(&materials), materials, findings, files })
 }
@@ -85,7 +85,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// The maps of the instance at a place of the scene; none without an atlas.
-    fn material(&mut self, at: usize) -> Result<Option<PredictedMaterial>, SceneError> {
+    fn material(&mut self, at: usize) -> Result<Option<PredictedMaterial>, DatasetError> {
         if self.scene.instances[at].atlas.is_none() {
             return Ok(None);
         }
@@ -95,7 +95,7 @@ impl Reader<'_> {
         Ok(Some(PredictedMaterial { base_color, roughness, metallic }))
     }
 
-    fn texture(&mut self, at: usize, map: Map) -> Result<Texture, SceneError> {
+    fn texture(&mut self, at: usize, map: Map) -> Result<Texture, DatasetError> {
         let (scene, instance) = (&self.scene.id, &self.scene.instances[at].id);
         let folder = MapFolder { submission: self.submission, scene, instance };
         let present = folder.present(map);
@@ -119,7 +119,7 @@ impl Reader<'_> {
     }
 
     /// The map of a file, or the finding that it is replaced. Fails only where the atlas cannot be read.
-    fn decoded(&mut self, path: &Path, at: usize, map: Map) -> Result<Result<Texture, Box<Finding>>, SceneError> {
+    fn decoded(&mut self, path: &Path, at: usize, map: Map) -> Result<Result<Texture, Box<Finding>>, DatasetError> {
         let atlases = self.atlases;
         let decoded = match self.read(path) {
             Ok(file) => map_file::decode(file, map, || atlases.mesh(at))?,

@@ -8,7 +8,7 @@ use mateval_files::whole::{is_abandoned, is_temporary, write_whole};
 use mateval_files::{FileError, work_folder};
 
 use crate::layout::{COMPARE, DATASET, MANIFEST};
-use crate::{Finding, SceneError, Severity};
+use crate::{DatasetError, Finding, Severity};
 
 /// The code of a finding about a file that the manifest lists and the dataset lacks.
 pub const MISSING_FILE: &str = "missing_file";
@@ -22,14 +22,14 @@ pub fn is_withheld(root: &Path, finding: &Finding) -> bool {
 
 /// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files
 /// in `root` itself. Links to folders are not followed.
-pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
+pub fn list_files(root: &Path) -> Result<Vec<String>, DatasetError> {
     let mut files = list_below(root, Path::new(""))?;
     files.retain(|file| ![MANIFEST, DATASET, COMPARE].contains(&file.as_str()) && !file.starts_with('.'));
     Ok(files)
 }
 
 /// The files below the folder `below` of `root`, relative to `root` and sorted. Links to folders are not followed.
-pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, SceneError> {
+pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, DatasetError> {
     let mut files = Vec::new();
     let mut folders = vec![below.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -50,11 +50,11 @@ pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, Scene
 }
 
 /// Removes the unfinished files and folders below `folder` whose processes are gone.
-pub(crate) fn remove_abandoned(folder: &Path) -> Result<(), SceneError> {
+pub(crate) fn remove_abandoned(folder: &Path) -> Result<(), DatasetError> {
     remove_those(folder, is_abandoned)
 }
 
-pub(crate) fn remove_those(folder: &Path, is_unwanted: fn(&Path) -> bool) -> Result<(), SceneError> {
+pub(crate) fn remove_those(folder: &Path, is_unwanted: fn(&Path) -> bool) -> Result<(), DatasetError> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     for entry in entries.flatten() {
         let path = entry.path();
@@ -69,12 +69,12 @@ pub(crate) fn remove_those(folder: &Path, is_unwanted: fn(&Path) -> bool) -> Res
 
 /// Hashes every file of the dataset and writes the manifest; unfinished files are left out, and removed where their
 /// processes are gone. Returns the manifest's own hash, which `dataset.json` holds.
-pub fn write(root: &Path) -> Result<String, SceneError> {
+pub fn write(root: &Path) -> Result<String, DatasetError> {
     write_with(root, &BTreeMap::new())
 }
 
 /// Like [`write()`], without reading the files whose hashes are `known` by their paths in the dataset.
-pub fn write_with(root: &Path, known: &BTreeMap<String, String>) -> Result<String, SceneError> {
+pub fn write_with(root: &Path, known: &BTreeMap<String, String>) -> Result<String, DatasetError> {
     let mut text = String::new();
     remove_abandoned(&root.join("scenes"))?;
     for file in list_files(root)?.into_iter().filter(|file| !file.split('/').any(is_temporary)) {
@@ -104,19 +104,19 @@ impl Entry {
 }
 
 /// The valid lines of the manifest in their order; [`check`] reports the others.
-pub fn entries(root: &Path) -> Result<Vec<Entry>, SceneError> {
+pub fn entries(root: &Path) -> Result<Vec<Entry>, DatasetError> {
     let path = root.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(FileError::io("read", &path))?;
     Ok(text.lines().filter_map(Entry::parse).collect())
 }
 
 /// Compares every file with the manifest: each one that is missing, changed or not listed is a finding.
-pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
+pub fn check(root: &Path) -> Result<Vec<Finding>, DatasetError> {
     check_those(root, |_| true)
 }
 
 /// Compares those files with the manifest that `concerns` accepts by their paths in the dataset.
-pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
+pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, DatasetError> {
     let path = root.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(FileError::io("read", &path))?;
     let mut findings = Vec::new();
@@ -162,12 +162,12 @@ fn is_linked_folder(root: &Path, file: &str) -> bool {
 }
 
 /// Fails if a file that was found is a link to a folder.
-pub(crate) fn refuse_linked_folder(root: &Path, file: &str) -> Result<(), SceneError> {
+pub(crate) fn refuse_linked_folder(root: &Path, file: &str) -> Result<(), DatasetError> {
     if !is_linked_folder(root, file) {
         return Ok(());
     }
     let what = format!("{LINKED_FOLDER}; {NO_LINKED_FOLDER}");
-    Err(SceneError::Unsupported { path: root.join(file), what })
+    Err(DatasetError::Unsupported { path: root.join(file), what })
 }
 
 fn is_inside(file: &str) -> bool {

@@ -19,27 +19,27 @@ use crate::manifest::{
     UNLISTED_FILE, changed_file, entries, list_below, missing_file, refuse_linked_folder, remove_abandoned,
     remove_those, unlisted_file,
 };
-use crate::{Finding, SceneError, SceneId, json};
+use crate::{DatasetError, Finding, SceneId, json};
 
 impl BuildFolder {
     /// The right to change a scene. Fails where another process changes it or finishes the dataset.
-    pub fn lease_of_scene(&self, scene: &SceneId) -> Result<Lease, SceneError> {
+    pub fn lease_of_scene(&self, scene: &SceneId) -> Result<Lease, DatasetError> {
         Ok(self.leases().part(scene.as_str())?)
     }
 
     /// The right to write the files that describe the whole dataset, or to replace it. Fails where another process does
     /// so, or changes a scene. `scenes` are those that are known.
-    pub fn lease_of_whole(&self, scenes: &[SceneId]) -> Result<Lease, SceneError> {
+    pub fn lease_of_whole(&self, scenes: &[SceneId]) -> Result<Lease, DatasetError> {
         Ok(self.leases().whole(scenes.iter().map(SceneId::as_str))?)
     }
 
     /// The right to begin or change the build; waits for other processes, which need it for a moment.
-    pub fn lease_of_start(&self) -> Result<Lease, SceneError> {
+    pub fn lease_of_start(&self) -> Result<Lease, DatasetError> {
         Ok(Lease::wait(&self.path().join("leases/start"), "the start of the build")?)
     }
 
     /// The right to write the dataset's `compare.json`; waits for other processes, which need it for a moment.
-    pub fn lease_of_verdict(&self) -> Result<Lease, SceneError> {
+    pub fn lease_of_verdict(&self) -> Result<Lease, DatasetError> {
         Ok(Lease::wait(&self.path().join("leases/verdict"), "the dataset's compare.json")?)
     }
 
@@ -48,7 +48,7 @@ impl BuildFolder {
     }
 
     /// Notes that the scene is about to differ from what the manifest lists.
-    pub fn note_change(&self, scene: &SceneId) -> Result<(), SceneError> {
+    pub fn note_change(&self, scene: &SceneId) -> Result<(), DatasetError> {
         let path = self.changed_folder();
         std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
         let path = path.join(scene.as_str());
@@ -65,7 +65,7 @@ impl BuildFolder {
     }
 
     /// Notes that the manifest lists all scenes as they are.
-    pub fn forget_changes(&self) -> Result<(), SceneError> {
+    pub fn forget_changes(&self) -> Result<(), DatasetError> {
         Ok(work_folder::remove(&self.changed_folder())?)
     }
 
@@ -110,7 +110,7 @@ impl Stamp {
 impl SceneHashes {
     /// The list of a scene. Of a scene that has not changed since the manifest was written, the manifest's hashes
     /// count. A list that cannot be read counts as missing.
-    pub fn open(root: &Path, scene: &SceneId) -> Result<Self, SceneError> {
+    pub fn open(root: &Path, scene: &SceneId) -> Result<Self, DatasetError> {
         let build = BuildFolder::of(root);
         let mut files: BTreeMap<String, Listed> = json::read(&build.hashes(scene)).unwrap_or_default();
         if root.join(MANIFEST).is_file() && !build.changed().contains(scene) {
@@ -140,7 +140,7 @@ impl SceneHashes {
     /// Compares the files with the list: each one that is missing, changed or not listed is a finding. Only those are
     /// compared that `concerns` accepts by their paths in the dataset, and only those are read whose size or times are
     /// not those of the list.
-    pub fn check(&mut self, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
+    pub fn check(&mut self, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, DatasetError> {
         let mut findings = Vec::new();
         for (file, listed) in self.files.iter_mut().filter(|(file, _)| concerns(file)) {
             let path = self.root.join(file);
@@ -163,7 +163,7 @@ impl SceneHashes {
 
     /// Lists the files as they are now, after `prep` wrote them, and keeps the list. Only those are read whose size or
     /// times are not those of the list.
-    pub fn update(&mut self) -> Result<(), SceneError> {
+    pub fn update(&mut self) -> Result<(), DatasetError> {
         let mut files = BTreeMap::new();
         for file in self.found()? {
             refuse_linked_folder(&self.root, &file)?;
@@ -181,7 +181,7 @@ impl SceneHashes {
     }
 
     /// Keeps the list, and notes that it counts from here on, and not the manifest: the scene is about to change.
-    pub fn note_change(&self) -> Result<(), SceneError> {
+    pub fn note_change(&self) -> Result<(), DatasetError> {
         self.keep()?;
         BuildFolder::of(&self.root).note_change(&self.scene)
     }
@@ -206,7 +206,7 @@ impl SceneHashes {
         Finding { action, ..finding }
     }
 
-    fn keep(&self) -> Result<(), SceneError> {
+    fn keep(&self) -> Result<(), DatasetError> {
         let list = BuildFolder::of(&self.root).hashes(&self.scene);
         let parent = list.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(parent).map_err(FileError::io("make", parent))?;
@@ -221,7 +221,7 @@ impl SceneHashes {
     }
 
     /// The scene's files but unfinished ones; those that a killed process left are removed.
-    fn found(&self) -> Result<Vec<String>, SceneError> {
+    fn found(&self) -> Result<Vec<String>, DatasetError> {
         remove_abandoned(&self.root.join(folder(&self.scene)))?;
         let files = list_below(&self.root, Path::new(&folder(&self.scene)))?;
         Ok(files.into_iter().filter(|file| !file.split('/').any(is_temporary)).collect())
@@ -230,15 +230,15 @@ impl SceneHashes {
 
 /// Removes all unfinished files and folders below `folder`, for a caller that holds the leases of everybody who writes
 /// there.
-pub fn remove_unfinished(folder: &Path) -> Result<(), SceneError> {
+pub fn remove_unfinished(folder: &Path) -> Result<(), DatasetError> {
     remove_those(folder, |path| path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy())))
 }
 
 /// The error where scenes that `concerns` accepts changed since the manifest was written.
-pub fn unfinished(root: &Path, concerns: impl Fn(&SceneId) -> bool) -> Option<SceneError> {
+pub fn unfinished(root: &Path, concerns: impl Fn(&SceneId) -> bool) -> Option<DatasetError> {
     let scenes: Vec<SceneId> = BuildFolder::of(root).changed().into_iter().filter(concerns).collect();
     let command = finishing_command(root, &scenes);
-    (!scenes.is_empty()).then(|| SceneError::Unfinished { path: root.to_owned(), scenes, command })
+    (!scenes.is_empty()).then(|| DatasetError::Unfinished { path: root.to_owned(), scenes, command })
 }
 
 /// The command after which the manifest lists the `changed` scenes: the render that was interrupted, which `prep finish`
@@ -269,7 +269,7 @@ fn folder(scene: &SceneId) -> String {
 /// Lets `work` write files of the scene, while no other process may, and lists all its files anew. `is_ours` accepts
 /// those that `work` may write, by their paths in the dataset. Fails where any other file is not the one that is
 /// listed, since a later manifest would list it as it is.
-pub fn change_scene<T, E: From<SceneError>>(
+pub fn change_scene<T, E: From<DatasetError>>(
     root: &Path,
     scene: &SceneId,
     is_ours: impl Fn(&str) -> bool,
@@ -280,7 +280,7 @@ pub fn change_scene<T, E: From<SceneError>>(
     let mut hashes = SceneHashes::open(root, scene)?;
     let findings = hashes.check(|path| !is_ours(path))?;
     if !findings.is_empty() {
-        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+        return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
     hashes.note_change()?;
     let done = work()?;

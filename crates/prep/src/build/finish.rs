@@ -12,7 +12,7 @@ use mateval_dataset::layout::{BuildFolder, DATASET, SceneFolder, TARGETS, is_inp
 use mateval_dataset::manifest;
 use mateval_dataset::open::{check_whole, read_dataset_file};
 use mateval_dataset::render_file::RENDER_FILE;
-use mateval_dataset::{Progress, RendererId, Report, SceneError, SceneId, json};
+use mateval_dataset::{DatasetError, Progress, RendererId, Report, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 use mateval_files::work_folder::remove;
@@ -62,7 +62,7 @@ fn finish_with(
     let all: Vec<SceneId> = recipe.scenes.iter().map(|entry| entry.id.clone()).collect();
     let unknown: Vec<SceneId> = without.iter().filter(|id| !all.contains(id)).cloned().collect();
     if !unknown.is_empty() {
-        return Err(SceneError::UnknownScenes { dataset: root.to_owned(), unknown, known: all }.into());
+        return Err(DatasetError::UnknownScenes { dataset: root.to_owned(), unknown, known: all }.into());
     }
     let _lease = build.lease_of_whole(&all)?;
     changes::remove_unfinished(&root.join("scenes"))?;
@@ -191,7 +191,7 @@ fn scene_hashes(
         lists.push((id, shown, list));
     }
     if !findings.is_empty() {
-        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+        return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
     for (id, shown, list) in &mut lists {
         if let Some(renderer) = shown {
