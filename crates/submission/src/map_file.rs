@@ -18,9 +18,6 @@ use crate::atlas::{TexelSet, reached};
 use crate::error::FileFault;
 use crate::files::{HashedFile, SubmittedFile};
 
-/// Largest file of a map, in bytes.
-pub const MAX_MAP_BYTES: u64 = 512 << 20;
-
 /// Most numbers that an OpenEXR file may hold in all its parts and channels together: eight channels of the largest
 /// map.
 pub const MAX_EXR_NUMBERS: usize = 8 * 4096 * 4096;

@@ -19,8 +19,8 @@ use super::map_headers::{self, Largest};
 use super::sight::{CoarseTexel, InstanceSight, Look, Pairs, ScalarLook, Sight, looks, scalar_looks};
 use crate::atlas::AtlasMeshes;
 use crate::error::{SubmissionError, error, note, warning};
-use crate::files::{MapFolder, SubmittedFile, relative};
-use crate::map_file::{self, MAX_MAP_BYTES, MapFile, MapHeader};
+use crate::files::{MAX_MAP_BYTES, MapFolder, SubmittedFile, relative};
+use crate::map_file::{self, MapFile, MapHeader};
 use crate::prediction::{MAX_SCENE_BYTES, MemoryBudget, compact_texture};
 
 /// Instances whose maps are in memory at once.
