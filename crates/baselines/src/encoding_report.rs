@@ -341,7 +341,7 @@ impl InputView {
             return Ok(Self { truth, valid, instances });
         }
         let what = "its pictures differ in size; run `mateval prep verify`".to_owned();
-        Err(mateval_dataset::SceneError::Unsupported { path: shown, what }.into())
+        Err(mateval_dataset::DatasetError::Unsupported { path: shown, what }.into())
     }
 
     /// Valid pixels whose eight neighbours are valid and show the same instance: at most `most`, evenly spaced in

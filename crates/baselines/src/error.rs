@@ -17,7 +17,7 @@ pub enum BaselineError {
     #[error(transparent)]
     Files(#[from] mateval_files::FileError),
     #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
+    Dataset(#[from] mateval_dataset::DatasetError),
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
 }

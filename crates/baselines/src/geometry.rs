@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use mateval_dataset::dataset::{Part, SceneFile, View};
 use mateval_dataset::layout::{INPUT, SceneFolder, part_picture};
 use mateval_dataset::submission::MAP_SIZES;
-use mateval_dataset::{Camera, PartSetId, SceneError, TriangleMesh, glb, reference};
+use mateval_dataset::{Camera, DatasetError, PartSetId, TriangleMesh, glb, reference};
 use mateval_image::{Mask, Picture, png_io};
 use mateval_tracer::World;
 use mateval_tracer::aov::{COARSE_SUBPIXELS, coarse_subpixels, hit_through};
@@ -40,7 +40,7 @@ impl<'a> SceneGeometry<'a> {
             scene.instances.iter().filter_map(|instance| Some((instance, instance.atlas.as_ref()?.size as usize)));
         if let Some((instance, size)) = { sizes }.find(|(_, size)| !MAP_SIZES.contains(size)) {
             let what = format!("instance '{}' has an atlas of {size} texels; run `mateval prep verify`", instance.id);
-            return Err(SceneError::Unsupported { path: folder.scene_file(), what }.into());
+            return Err(DatasetError::Unsupported { path: folder.scene_file(), what }.into());
         }
         let world = World::new(Arc::new(reference::read_plain(&folder, scene)?))?;
         let valid = png_io::read_mask(&shown.join("valid.png"))?;
@@ -49,7 +49,7 @@ impl<'a> SceneGeometry<'a> {
         if (valid.width(), valid.height()) != size || (instances.width(), instances.height()) != size {
             let what =
                 "valid.png or instance.png is not as large as scene.json says; run `mateval prep verify`".to_owned();
-            return Err(SceneError::Unsupported { path: shown, what }.into());
+            return Err(DatasetError::Unsupported { path: shown, what }.into());
         }
         Ok(Self { scene, view, folder, world, valid, instances })
     }
@@ -72,7 +72,7 @@ impl<'a> SceneGeometry<'a> {
             return Ok(picture);
         }
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
-        Err(SceneError::Unsupported { path, what }.into())
+        Err(DatasetError::Unsupported { path, what }.into())
     }
 }
 
@@ -269,6 +269,6 @@ pub fn parts_of<'a>(geometry: &SceneGeometry<'a>, set: Option<&PartSetId>) -> Re
     let found = geometry.scene.all_part_sets().find(|(id, _)| *id == set).map(|(_, parts)| parts);
     found.ok_or_else(|| {
         let what = format!("no part set '{}'; `part_labels` in a recipe makes one", set.map_or("", PartSetId::as_str));
-        SceneError::Unsupported { path: geometry.folder.scene_file(), what }.into()
+        DatasetError::Unsupported { path: geometry.folder.scene_file(), what }.into()
     })
 }

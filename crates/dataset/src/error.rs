@@ -10,7 +10,7 @@ use crate::ids::{SceneId, quoted};
 
 /// Why a dataset or a part of it could not be read or written.
 #[derive(Debug, thiserror::Error)]
-pub enum SceneError {
+pub enum DatasetError {
     /// The path is not the folder of a finished dataset.
     #[error("'{}' is not a dataset: {reason}", path.display())]
     NotADataset {
@@ -94,7 +94,7 @@ pub enum SceneError {
     Image(#[from] mateval_image::ImageError),
 }
 
-impl SceneError {
+impl DatasetError {
     /// One fault of the file at `path`.
     pub(crate) fn invalid(path: &Path, code: &str, place: String, message: String, action: &str) -> Self {
         let file = path.file_name().unwrap_or_default().to_string_lossy();

@@ -2,39 +2,29 @@
 //!
 //! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
-//! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mod@mesh`], [`uv_atlas`], [`material`] and
-//! [`mod@reference`] describe a scene with its materials and lights. [`dataset`], [`layout`], [`manifest`], [`open`]
-//! [`render_file`] and [`verdict`] are the files of a dataset, [`submission`] those of a submission. [`obj`] and
-//! [`gltf_file`] read untrusted files.
+//! Each folder uses those before it: `values` (what a scene consists of), `foreign` (untrusted files of other formats),
+//! `format` (the files of a dataset and of a submission), `records` (what commands note of their work on a dataset).
+//! [`open`] reads a dataset through all of them.
 
-pub mod camera;
-pub mod dataset;
+mod foreign;
+mod format;
+mod records;
+mod values;
+
 pub mod error;
-pub mod findings;
-pub mod glb;
-pub mod gltf_file;
-pub mod ids;
-pub mod json;
-pub mod layout;
-pub mod manifest;
-pub mod material;
-pub mod mesh;
-pub mod obj;
 pub mod open;
 pub mod progress;
-pub mod reference;
-pub mod render_file;
-pub mod scene_cost;
-pub mod specular_glossiness;
 pub mod splitmix64;
-pub mod submission;
-pub mod uv_atlas;
-pub mod verdict;
 pub mod word_enum;
+
+pub use foreign::{gltf_file, obj, specular_glossiness};
+pub use format::{dataset, glb, json, layout, manifest, reference, submission};
+pub use records::{changes, render_file, scene_cost, verdict};
+pub use values::{camera, findings, ids, material, mesh, uv_atlas};
 
 pub use camera::{Camera, Intrinsics};
 pub use dataset::{Role, SceneLights, SourceKind};
-pub use error::SceneError;
+pub use error::DatasetError;
 pub use findings::{Finding, FindingCount, Severity};
 pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;

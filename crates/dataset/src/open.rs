@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::{DatasetFile, DatasetVersion, FORMAT, SceneFile, TargetsFile, WideView};
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use crate::{Finding, RendererId, SceneError, SceneId, Severity, SourceKind, ViewId, json, manifest};
+use crate::{DatasetError, Finding, RendererId, SceneId, Severity, SourceKind, ViewId, changes, json, manifest};
 
 /// A finished dataset on disk.
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ impl Dataset {
     /// Opens the dataset in `root`. Fails where a JSON file is not valid or not the one that the manifest lists, or
     /// where the manifest is not the one that `dataset.json` names. Faults of several files are reported together.
     /// Other files are not hashed: see [`Dataset::check_files`]. A scene may be missing as a whole, but not in part.
-    pub fn open(root: &Path) -> Result<Self, SceneError> {
+    pub fn open(root: &Path) -> Result<Self, DatasetError> {
         let file = read_dataset_file(root)?;
         let found = sha256_of_file(&root.join(MANIFEST))?;
         if found != file.manifest_sha256 {
@@ -41,7 +41,7 @@ impl Dataset {
                 "manifest_sha256 is {}, but MANIFEST.sha256 hashes to {found}; an unfinished `prep` or a changed file",
                 file.manifest_sha256
             );
-            return Err(SceneError::Unsupported { path: root.join(DATASET), what });
+            return Err(DatasetError::Unsupported { path: root.join(DATASET), what });
         }
         let absent = absent_scenes(root, &file)?;
         // What a lost process left unfinished is no scene.
@@ -66,14 +66,14 @@ impl Dataset {
 
     /// Fails where a file of the scene differs from the manifest, since results made from it would not deserve the
     /// dataset's fingerprint. Only files are checked that `concerns` accepts by their paths in the scene's folder.
-    pub fn check_files(&self, scene: &SceneId, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
+    pub fn check_files(&self, scene: &SceneId, concerns: impl Fn(&str) -> bool) -> Result<(), DatasetError> {
         let folder = format!("scenes/{scene}/");
         check_hashes(&self.root, |path| path.strip_prefix(&folder).is_some_and(&concerns))
     }
 
     /// The scenes with these ids, in the dataset's order; all that are not absent where `ids` is empty. Fails where an
     /// id is unknown or its scene is absent, and where every scene is.
-    pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, SceneError> {
+    pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, DatasetError> {
         let chosen = known_ids(&self.root, &self.file, ids)?;
         let is_needed = |id: &&SceneId| ids.contains(id) || self.scenes.is_empty();
         let absent = self.absent.iter().filter(is_needed).cloned().collect();
@@ -82,7 +82,7 @@ impl Dataset {
     }
 
     /// Fails where a scene is absent, for work that needs all scenes.
-    pub fn check_whole(&self) -> Result<(), SceneError> {
+    pub fn check_whole(&self) -> Result<(), DatasetError> {
         check_none_absent(&self.root, &self.file, self.absent.clone())
     }
 
@@ -95,7 +95,7 @@ impl Dataset {
     }
 
     /// The scene with this id. Fails where the dataset has none.
-    pub fn scene(&self, id: &SceneId) -> Result<&SceneFile, SceneError> {
+    pub fn scene(&self, id: &SceneId) -> Result<&SceneFile, DatasetError> {
         let chosen = self.chosen_scenes(std::slice::from_ref(id))?;
         Ok(chosen[0])
     }
@@ -113,35 +113,35 @@ impl Dataset {
 
 /// The ids among `ids` in the order of the dataset in `root`; all its ids where `ids` is empty. Fails where an id is
 /// unknown, or where the folder of any scene is missing: this serves work that rewrites the manifest.
-pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, SceneError> {
+pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, DatasetError> {
     check_whole(root, file)?;
     known_ids(root, file, ids)
 }
 
 /// Fails where the folder of a scene that `file`, the `dataset.json` in `root`, lists is missing.
-pub fn check_whole(root: &Path, file: &DatasetFile) -> Result<(), SceneError> {
+pub fn check_whole(root: &Path, file: &DatasetFile) -> Result<(), DatasetError> {
     check_none_absent(root, file, absent_scenes(root, file)?)
 }
 
-fn check_none_absent(root: &Path, file: &DatasetFile, absent: Vec<SceneId>) -> Result<(), SceneError> {
+fn check_none_absent(root: &Path, file: &DatasetFile, absent: Vec<SceneId>) -> Result<(), DatasetError> {
     if absent.is_empty() {
         return Ok(());
     }
-    Err(SceneError::AbsentScenes { dataset: root.to_owned(), absent, total: file.scenes.len() })
+    Err(DatasetError::AbsentScenes { dataset: root.to_owned(), absent, total: file.scenes.len() })
 }
 
 /// Fails where the output `out`, the value of the argument `place`, would lie in the dataset in `root`.
-pub fn check_outside(out: &Path, root: &Path, place: &'static str) -> Result<(), SceneError> {
+pub fn check_outside(out: &Path, root: &Path, place: &'static str) -> Result<(), DatasetError> {
     match is_inside(out, root) {
-        true => Err(SceneError::OutputInDataset { path: out.to_owned(), dataset: root.to_owned(), place }),
+        true => Err(DatasetError::OutputInDataset { path: out.to_owned(), dataset: root.to_owned(), place }),
         false => Ok(()),
     }
 }
 
 /// Fails where the output `out`, the value of the argument `place`, would lie in any dataset.
-pub fn check_outside_datasets(out: &Path, place: &'static str) -> Result<(), SceneError> {
+pub fn check_outside_datasets(out: &Path, place: &'static str) -> Result<(), DatasetError> {
     match enclosing_dataset(out) {
-        Some(dataset) => Err(SceneError::OutputInDataset { path: out.to_owned(), dataset, place }),
+        Some(dataset) => Err(DatasetError::OutputInDataset { path: out.to_owned(), dataset, place }),
         None => Ok(()),
     }
 }
@@ -156,7 +156,7 @@ fn enclosing_dataset(path: &Path) -> Option<PathBuf> {
 }
 
 /// Reads `dataset.json` of the dataset in `root`. The error for another folder names what was found.
-pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, SceneError> {
+pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, DatasetError> {
     let path = root.join(DATASET);
     if path.is_file() {
         return json::read_format(&path, FORMAT);
@@ -175,11 +175,11 @@ pub fn read_dataset_file(root: &Path) -> Result<DatasetFile, SceneError> {
             None => "it has no dataset.json; where its build did not finish, run `mateval prep build` again".to_owned(),
         },
     };
-    Err(SceneError::NotADataset { path: root.to_owned(), reason })
+    Err(DatasetError::NotADataset { path: root.to_owned(), reason })
 }
 
 /// The scenes that `dataset.json` and the manifest list and whose folders do not exist, in the order of `dataset.json`.
-pub fn absent_scenes(root: &Path, file: &DatasetFile) -> Result<Vec<SceneId>, SceneError> {
+pub fn absent_scenes(root: &Path, file: &DatasetFile) -> Result<Vec<SceneId>, DatasetError> {
     let mut absent: Vec<SceneId> =
         file.scenes.iter().filter(|id| !SceneFolder::of(root, id).path().exists()).cloned().collect();
     if !absent.is_empty() {
@@ -195,21 +195,21 @@ pub fn is_below(path: &str, scenes: &[SceneId]) -> bool {
     folder.is_some_and(|(folder, _)| scenes.iter().any(|scene| scene.as_str() == folder))
 }
 
-fn known_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, SceneError> {
+fn known_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, DatasetError> {
     let unknown: Vec<SceneId> = ids.iter().filter(|id| !file.scenes.contains(id)).cloned().collect();
     if !unknown.is_empty() {
-        return Err(SceneError::UnknownScenes { dataset: root.to_owned(), unknown, known: file.scenes.clone() });
+        return Err(DatasetError::UnknownScenes { dataset: root.to_owned(), unknown, known: file.scenes.clone() });
     }
     Ok(file.scenes.iter().filter(|id| ids.is_empty() || ids.contains(id)).collect())
 }
 
 /// Joins the errors of several JSON files into one.
-fn together(root: &Path, mut faults: Vec<(String, SceneError)>) -> SceneError {
+fn together(root: &Path, mut faults: Vec<(String, DatasetError)>) -> DatasetError {
     if faults.len() == 1 {
         return faults.remove(0).1;
     }
     let all = faults.into_iter().flat_map(|(file, fault)| match fault {
-        SceneError::Invalid { findings, .. } => {
+        DatasetError::Invalid { findings, .. } => {
             findings.into_iter().map(|finding| Finding { file: file.clone(), ..finding }).collect()
         }
         other => {
@@ -219,38 +219,38 @@ fn together(root: &Path, mut faults: Vec<(String, SceneError)>) -> SceneError {
     });
     let mut findings: Vec<Finding> = all.collect();
     findings.sort();
-    SceneError::Invalid { path: root.to_owned(), findings }
+    DatasetError::Invalid { path: root.to_owned(), findings }
 }
 
-fn read_targets(root: &Path) -> Result<TargetsFile, SceneError> {
+fn read_targets(root: &Path) -> Result<TargetsFile, DatasetError> {
     json::read_format(&root.join(TARGETS), FORMAT)
 }
 
-fn read_scene(root: &Path, id: &SceneId) -> Result<SceneFile, SceneError> {
+fn read_scene(root: &Path, id: &SceneId) -> Result<SceneFile, DatasetError> {
     let path = SceneFolder::of(root, id).scene_file();
     let scene: SceneFile = json::read_format(&path, FORMAT)?;
     if scene.id == *id {
         return Ok(scene);
     }
     let what = format!("id '{}' in the folder of '{id}'; run `mateval prep verify`", scene.id);
-    Err(SceneError::Unsupported { path, what })
+    Err(DatasetError::Unsupported { path, what })
 }
 
-fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
+fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), DatasetError> {
     let findings = manifest::check_those(root, concerns)?;
     if findings.is_empty() {
         return Ok(());
     }
-    if let Some(error) = manifest::unfinished(root, |_| true) {
+    if let Some(error) = changes::unfinished(root, |_| true) {
         return Err(error);
     }
     let path = root.to_owned();
     let is_withheld =
         |finding: &Finding| finding.code == manifest::MISSING_FILE && finding.file.contains("/ground_truth/");
     if findings.iter().all(is_withheld) {
-        return Err(SceneError::TruthWithheld { path, files: findings.len(), first: findings[0].file.clone() });
+        return Err(DatasetError::TruthWithheld { path, files: findings.len(), first: findings[0].file.clone() });
     }
-    Err(SceneError::Invalid { path, findings })
+    Err(DatasetError::Invalid { path, findings })
 }
 
 /// The dataset and the scenes that were scored or checked.
@@ -324,7 +324,7 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
         let reason = |root: &Path| match read_dataset_file(root) {
-            Err(SceneError::NotADataset { reason, .. }) => reason,
+            Err(DatasetError::NotADataset { reason, .. }) => reason,
             other => panic!("{other:?}"),
         };
         assert_eq!(reason(&folder.path().join("nowhere")), "the folder does not exist");
@@ -352,7 +352,7 @@ mod tests {
         for (known, unknown, pointer) in words {
             std::fs::write(&path, example.replacen(known, unknown, 1)).unwrap();
             let error = read_scene(folder.path(), &id).unwrap_err();
-            let SceneError::Invalid { findings, .. } = &error else { panic!("{error}") };
+            let DatasetError::Invalid { findings, .. } = &error else { panic!("{error}") };
             assert_eq!(findings[0].place, pointer);
         }
     }

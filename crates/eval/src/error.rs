@@ -77,7 +77,7 @@ pub enum EvalError {
     )]
     InputNotTarget { scene: SceneId },
     #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
+    Dataset(#[from] mateval_dataset::DatasetError),
     #[error(transparent)]
     Submission(#[from] mateval_submission::SubmissionError),
     #[error(transparent)]

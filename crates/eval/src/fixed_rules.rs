@@ -8,7 +8,7 @@
 use mateval_dataset::submission::MAP_SIZES;
 use mateval_light::light_fit;
 use mateval_metrics::{Psnr, flip, lpips, ssim};
-use mateval_submission::{atlas, map_file, prediction, texel_map};
+use mateval_submission::{atlas, files, map_file, prediction, texel_map};
 use mateval_tracer::emitter::group_shares;
 use mateval_tracer::{emitter, noise_filter, world};
 use schemars::JsonSchema;
@@ -66,7 +66,7 @@ fixed_rules! {
     /// The smallest and the largest side of a map, in texels, by the format.
     map_sides: [usize; 2] = [*MAP_SIZES.start(), *MAP_SIZES.end()],
     /// A map whose file is larger than this, in bytes, is unsound, by the format.
-    most_map_bytes: u64 = map_file::MAX_MAP_BYTES,
+    most_map_bytes: u64 = files::MAX_MAP_BYTES,
     /// An EXR map of more numbers than this is unsound, by the format.
     most_exr_numbers: usize = map_file::MAX_EXR_NUMBERS,
     /// Maps of a scene that take more memory than this together, in bytes, are unsound, by the format.

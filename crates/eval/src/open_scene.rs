@@ -6,7 +6,7 @@ use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{SceneFolder, is_rendered};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::{self, Surface};
-use mateval_dataset::{SceneError, TriangleMesh};
+use mateval_dataset::{DatasetError, TriangleMesh};
 use mateval_tracer::World;
 
 use crate::error::EvalError;
@@ -76,5 +76,5 @@ fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Resul
     }
     let path = folder.instances();
     let what = "it does not fit ground_truth/reference/geometry.glb; run `mateval prep verify`";
-    Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
+    Err(DatasetError::Unsupported { path, what: what.to_owned() }.into())
 }

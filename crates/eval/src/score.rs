@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use mateval_dataset::changes;
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::manifest;
 use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::verdict::{CompareCounts, VerdictFile};
@@ -111,7 +111,7 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
     // The light of a scene that was rendered apart since the manifest was written would silently not be scored.
     let is_scored = |id: &SceneId| scenes.iter().any(|scene| scene.id == *id);
-    if let Some(error) = manifest::unfinished(&plan.dataset.root, is_scored) {
+    if let Some(error) = changes::unfinished(&plan.dataset.root, is_scored) {
         return Err(error.into());
     }
     plan.check_cached(&scenes)?;

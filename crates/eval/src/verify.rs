@@ -9,7 +9,7 @@ use std::path::Path;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, Progress, Severity, json};
 use mateval_files::untrusted::sha256_of_file;
-use mateval_submission::prediction::hashed_submission;
+use mateval_submission::files::hashed_submission;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -8,7 +8,7 @@ use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{INPUT, MANIFEST};
 use mateval_dataset::manifest::{self, Entry, is_withheld};
 use mateval_dataset::open::{Dataset, is_below};
-use mateval_dataset::{Camera, Progress, Report, SceneError, SceneId, ViewId};
+use mateval_dataset::{Camera, DatasetError, Progress, Report, SceneId, ViewId};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 
@@ -83,7 +83,7 @@ pub enum ExportError {
     Parquet { path: PathBuf, source: parquet::errors::ParquetError },
     /// The dataset is not valid, or lacks scenes that the format needs, or the output could not be written.
     #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
+    Dataset(#[from] mateval_dataset::DatasetError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
@@ -116,7 +116,7 @@ impl SoundDataset {
         let mut findings = manifest::check_those(root, |file| !is_below(file, &dataset.absent))?;
         findings.retain(|finding| !is_withheld(root, finding));
         if !findings.is_empty() {
-            return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+            return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
         }
         let listed = manifest::entries(root)?.into_iter().map(|Entry { file, .. }| file);
         let files: Vec<String> = listed.filter(|file| root.join(file).exists()).collect();

@@ -13,7 +13,7 @@ use mateval_dataset::dataset::DatasetFile;
 use mateval_dataset::manifest;
 use mateval_dataset::open::DatasetId;
 use mateval_dataset::open::{Dataset, chosen_ids};
-use mateval_dataset::{Camera, SceneError, SceneId, json};
+use mateval_dataset::{Camera, DatasetError, SceneId, json};
 use mateval_export::{ExportError, ExportOptions, Exported, Format, export};
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_image::exr_io;
@@ -474,7 +474,7 @@ fn changed_missing_and_unlisted_files() {
         change(folder.path());
         for format in FORMATS {
             let (out, found) = exported(folder.path(), format);
-            let Err(ExportError::Dataset(SceneError::Invalid { findings, .. })) = found else { panic!("{found:?}") };
+            let Err(ExportError::Dataset(DatasetError::Invalid { findings, .. })) = found else { panic!("{found:?}") };
             assert_eq!(findings.iter().map(|finding| finding.code.as_str()).collect::<Vec<_>>(), [code]);
             assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 0);
         }
@@ -515,7 +515,7 @@ fn names_that_lead_out_of_the_dataset() {
 fn outputs_that_exist_or_lie_in_the_dataset() {
     let folder = copy();
     let inside = options(folder.path(), Format::Tar, folder.path().join("scenes/out"));
-    assert!(matches!(export(&inside, &|_| ()), Err(ExportError::Dataset(SceneError::OutputInDataset { .. }))));
+    assert!(matches!(export(&inside, &|_| ()), Err(ExportError::Dataset(DatasetError::OutputInDataset { .. }))));
     let place = tempfile::tempdir().unwrap();
     let taken = options(folder.path(), Format::Tar, place.path().to_owned());
     let text = export(&taken, &|_| ()).unwrap_err().to_string();

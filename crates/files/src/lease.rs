@@ -4,6 +4,7 @@
 //! network file systems, where `flock` often does not hold. The holder touches it; one that has not been touched for
 //! long belongs to a lost host and may be broken.
 
+use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -92,9 +93,51 @@ fn write_over(path: &Path, text: &str) -> std::io::Result<()> {
 }
 
 /// Fails where a process holds the lease.
-pub fn check_free(path: &Path, what: &str) -> Result<(), FileError> {
+fn check_free(path: &Path, what: &str) -> Result<(), FileError> {
     // The claim comes first: it makes a network client look at the folder anew.
     Claim::new(path)?.check_lost(path, what)
+}
+
+/// The leases of a whole and of its parts, which may be changed side by side, but neither twice nor during a change of
+/// the whole.
+pub struct LeaseSet {
+    /// The folder of the leases; those of parts are in `<part>s`, as in `scenes`.
+    pub folder: PathBuf,
+    /// The word for a part, as in "scene".
+    pub part: &'static str,
+    /// What the lease of the whole allows to change.
+    pub whole: &'static str,
+}
+
+impl LeaseSet {
+    /// The right to change a part. Fails where another process changes it or the whole.
+    pub fn part(&self, name: &str) -> Result<Lease, FileError> {
+        let lease = Lease::take(&self.file(name), &self.what(name))?;
+        check_free(&self.folder.join("whole"), self.whole)?;
+        Ok(lease)
+    }
+
+    /// The right to change the whole. Fails where another process does or changes a part. The parts in `known` are
+    /// looked for by name too: a network client may list a folder late.
+    pub fn whole<'a>(&self, known: impl IntoIterator<Item = &'a str>) -> Result<Lease, FileError> {
+        // Taken before parts are looked for: one that is taken from here on finds it.
+        let lease = Lease::take(&self.folder.join("whole"), self.whole)?;
+        let entries = std::fs::read_dir(self.folder.join(format!("{}s", self.part))).into_iter().flatten().flatten();
+        let found = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        // Names with a dot are claims, or files of the file system's own.
+        let found = found.filter(|name| !name.starts_with('.'));
+        let names: BTreeSet<String> = known.into_iter().map(str::to_owned).chain(found).collect();
+        names.iter().try_for_each(|name| check_free(&self.file(name), &self.what(name)))?;
+        Ok(lease)
+    }
+
+    fn file(&self, part: &str) -> PathBuf {
+        self.folder.join(format!("{}s", self.part)).join(part)
+    }
+
+    fn what(&self, part: &str) -> String {
+        format!("{} '{part}'", self.part)
+    }
 }
 
 /// A file beside a lease's place that names this process, to be linked there.
@@ -262,5 +305,20 @@ mod tests {
         assert!(path.exists());
         drop(second);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_part_and_the_whole_exclude_each_other() {
+        let place = tempfile::tempdir().unwrap();
+        let leases = LeaseSet { folder: place.path().join("leases"), part: "house", whole: "the survey" };
+        let (first, second) = (leases.part("a").unwrap(), leases.part("b").unwrap());
+        assert!(leases.part("a").unwrap_err().to_string().contains("is at work on house 'a'"));
+        assert!(leases.whole([]).unwrap_err().to_string().contains("is at work on house 'a'"));
+        drop((first, second));
+        let whole = leases.whole(["a", "c"]).unwrap();
+        assert!(leases.part("a").unwrap_err().to_string().contains("is at work on the survey"));
+        assert!(leases.whole([]).is_err());
+        drop(whole);
+        leases.part("a").unwrap();
     }
 }

@@ -8,7 +8,7 @@ use mateval_dataset::{RendererId, SceneId};
 use mateval_files::FileError;
 use mateval_files::untrusted::in_words;
 
-use crate::build::fault::SceneFault;
+use crate::build::fault::BuildFault;
 use crate::recipe::fault::RecipeFault;
 
 /// Why a dataset, its renders or a survey could not be made or examined.
@@ -130,7 +130,7 @@ pub enum PrepError {
     )]
     StrayScenes { path: PathBuf, names: Vec<String> },
     #[error("scene '{scene}': {fault}")]
-    Scene { scene: SceneId, fault: Box<SceneFault> },
+    Scene { scene: SceneId, fault: Box<BuildFault> },
     /// The source could not be read at all.
     #[error(transparent)]
     Source(#[from] mateval_sources::SourceError),
@@ -139,7 +139,7 @@ pub enum PrepError {
     Tracer(#[from] mateval_tracer::TracerError),
     /// The dataset could not be read or written.
     #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
+    Dataset(#[from] mateval_dataset::DatasetError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
@@ -151,7 +151,7 @@ impl PrepError {
         Self::Unusable { path: path.into(), why }
     }
     /// A [`PrepError::Scene`]; to be used with `map_err`.
-    pub(crate) fn scene<E: Into<SceneFault>>(scene: &SceneId) -> impl FnOnce(E) -> Self {
+    pub(crate) fn scene<E: Into<BuildFault>>(scene: &SceneId) -> impl FnOnce(E) -> Self {
         move |fault| Self::Scene { scene: scene.clone(), fault: Box::new(fault.into()) }
     }
 }

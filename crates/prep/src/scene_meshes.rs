@@ -131,7 +131,7 @@ pub fn part_values(folder: &SceneFolder, scene: &SceneFile) -> Result<Vec<Vec<u1
     let mut faults = Faults::default();
     let Some(meshes) = check(folder, scene, &mut faults) else {
         let path = folder.path().to_owned();
-        return Err(mateval_dataset::SceneError::Invalid { path, findings: faults.all }.into());
+        return Err(mateval_dataset::DatasetError::Invalid { path, findings: faults.all }.into());
     };
     Ok(meshes.part_values(scene).swap_remove(0).1)
 }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use half::f16;
-use mateval_dataset::{Camera, SceneError};
+use mateval_dataset::{Camera, DatasetError};
 use mateval_image::limits::MAX_PIXELS;
 use mateval_image::transfer::{byte_from_unit, linear_from_srgb};
 use mateval_image::{ImageError, LinearRgb, Mask, Picture, SrgbRgb, png_io};
@@ -60,7 +60,7 @@ pub fn read_picture<T: Copy + Send>(
     }
     let found = format!("{}x{} pixels", picture.width(), picture.height());
     let what = format!("it has {found}; scene.json says {width}x{height}; run `mateval prep verify`");
-    Err(failed(SceneError::Unsupported { path, what }))
+    Err(failed(DatasetError::Unsupported { path, what }))
 }
 
 /// The numbers of an array, row by row.

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::SceneFolder;
-use mateval_dataset::{Role, SceneError, TriangleMesh, dataset, open, reference};
+use mateval_dataset::{DatasetError, Role, TriangleMesh, dataset, open, reference};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -190,7 +190,7 @@ impl SceneSource {
     }
 
     /// The mesh of an instance by its place in `scene.json`. The first call reads those of all instances.
-    pub fn mesh(&self, instance: usize) -> Result<Arc<TriangleMesh>, SceneError> {
+    pub fn mesh(&self, instance: usize) -> Result<Arc<TriangleMesh>, DatasetError> {
         if let Some(meshes) = self.meshes.get() {
             return Ok(Arc::clone(&meshes[instance]));
         }

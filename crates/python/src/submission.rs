@@ -9,7 +9,7 @@ use mateval_dataset::open::Dataset as OpenDataset;
 use mateval_dataset::submission::{
     Cost, MAP_SIZES, Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, instance_folder,
 };
-use mateval_dataset::{SceneError, SceneId, json};
+use mateval_dataset::{DatasetError, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::work_folder::WorkFolder;
 use mateval_image::exr_io::{self, Precision};
@@ -115,7 +115,7 @@ impl Submission {
         drop(open);
         py.detach(|| {
             std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
-            files.iter().try_for_each(MapFile::write).map_err(SceneError::from)
+            files.iter().try_for_each(MapFile::write).map_err(DatasetError::from)
         })
         .map_err(failed)
     }
@@ -131,7 +131,7 @@ impl Submission {
         drop(open);
         py.detach(|| {
             json::write(&work.path().join(SUBMISSION), &self.file)?;
-            Ok::<_, SceneError>(work.finish()?)
+            Ok::<_, DatasetError>(work.finish()?)
         })
         .map_err(failed)
     }

@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::DatasetVersion;
-use mateval_dataset::{Finding, SceneError, SceneId, Severity};
+use mateval_dataset::{DatasetError, Finding, SceneId, Severity};
 use mateval_eval::EvalError;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
@@ -71,7 +71,7 @@ pub enum ReportError {
     Files(#[from] FileError),
     /// The dataset could not be read.
     #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
+    Dataset(#[from] mateval_dataset::DatasetError),
     /// The dataset could not be verified, or its recipe not be read.
     #[error(transparent)]
     Prep(#[from] mateval_prep::PrepError),
@@ -167,11 +167,11 @@ pub(crate) fn fitting<T>(
     let (place, message) = match read.map_err(Into::into) {
         Ok(value) => return Ok(Some(value)),
         Err(ReportError::Dataset(error) | ReportError::Eval(EvalError::Dataset(error))) => match error {
-            SceneError::Format { found, expected: format, .. } => (
+            DatasetError::Format { found, expected: format, .. } => (
                 "/format".to_owned(),
                 format!("expected {expected}, found: the format '{found}' in place of '{format}'"),
             ),
-            SceneError::Invalid { findings: faults, .. } => {
+            DatasetError::Invalid { findings: faults, .. } => {
                 let (place, found) =
                     faults.into_iter().next().map(|fault| (fault.place, fault.message)).unwrap_or_default();
                 (place, format!("expected {expected}, found: {found}"))

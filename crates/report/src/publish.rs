@@ -10,7 +10,7 @@ use mateval_dataset::dataset::{DatasetFile, FORMAT};
 use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST, is_ground_truth};
 use mateval_dataset::manifest::{self, Entry};
 use mateval_dataset::open::check_whole;
-use mateval_dataset::{Progress, Report, SceneError, json};
+use mateval_dataset::{DatasetError, Progress, Report, json};
 use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_files::work_folder::{WorkFolder, check_holds_none};
@@ -39,7 +39,7 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     progress(Report::step("hashes", 0, 1));
     let findings = manifest::check(root)?;
     if !findings.is_empty() {
-        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+        return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
     let (withheld, shown) = split(root)?;
     if withheld.is_empty() {

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{SceneError, TriangleMesh, reference};
+use mateval_dataset::{DatasetError, TriangleMesh, reference};
 
 /// By how much the square of texels that a place reads is larger on each side, in texels, for coordinates of up to 1;
 /// in proportion beyond. Lookups round to single precision: in the largest map they are off by up to a thousandth of a
@@ -40,7 +40,7 @@ impl<'a> AtlasMeshes<'a> {
 
     /// The mesh of an instance, by its place in `scene.json`; panics where there is no such instance. Fails where
     /// `instances.glb` cannot be read, differs from the manifest or does not fit `scene.json`.
-    pub fn mesh(&self, instance: usize) -> Result<&TriangleMesh, SceneError> {
+    pub fn mesh(&self, instance: usize) -> Result<&TriangleMesh, DatasetError> {
         match self.source {
             Source::Memory(meshes) => Ok(&meshes[instance]),
             Source::Dataset(dataset, scene) => {
@@ -55,7 +55,7 @@ impl<'a> AtlasMeshes<'a> {
     }
 }
 
-fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Vec<TriangleMesh>, SceneError> {
+fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Vec<TriangleMesh>, DatasetError> {
     // They decide what a bad texel scores, so they must be those that the dataset's fingerprint covers.
     dataset.check_files(&scene.id, |file| file == "geometry/instances.glb")?;
     let instances = reference::read_plain(&dataset.folder(&scene.id), scene)?;

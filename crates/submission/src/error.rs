@@ -25,7 +25,7 @@ pub enum SubmissionError {
     #[error("cannot check against '{}': expected {expected}, found {found}; run `mateval prep verify`", scene_file.display())]
     UnsoundScene { scene_file: PathBuf, expected: String, found: String },
     #[error(transparent)]
-    Dataset(#[from] mateval_dataset::SceneError),
+    Dataset(#[from] mateval_dataset::DatasetError),
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),
     #[error(transparent)]

@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
-use mateval_dataset::{SceneError, TriangleMesh};
+use mateval_dataset::{DatasetError, TriangleMesh};
 use mateval_files::untrusted::{is_lfs_pointer, kind_name, shortened};
 use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
 use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
@@ -17,9 +17,6 @@ use mateval_image::{ImageError, Texels, Texture, texture_io};
 use crate::atlas::{TexelSet, reached};
 use crate::error::FileFault;
 use crate::files::{HashedFile, SubmittedFile};
-
-/// Largest file of a map, in bytes.
-pub const MAX_MAP_BYTES: u64 = 512 << 20;
 
 /// Most numbers that an OpenEXR file may hold in all its parts and channels together: eight channels of the largest
 /// map.
@@ -73,8 +70,8 @@ pub struct MapFile {
 pub fn decode<'a>(
     file: SubmittedFile,
     map: Map,
-    atlas: impl FnOnce() -> Result<&'a TriangleMesh, SceneError>,
-) -> Result<Result<MapFile, FileFault>, SceneError> {
+    atlas: impl FnOnce() -> Result<&'a TriangleMesh, DatasetError>,
+) -> Result<Result<MapFile, FileFault>, DatasetError> {
     let SubmittedFile { path, hashed: HashedFile { sha256, .. }, bytes } = file;
     let decoded = check_header(&path, &bytes, map).and_then(|header| {
         let texture = texels(&path, bytes, map, &header)?;
@@ -206,8 +203,8 @@ type Repaired = Result<(Texture, Option<FileFault>), FileFault>;
 fn repaired<'a>(
     texture: Texture,
     map: Map,
-    atlas: impl FnOnce() -> Result<&'a TriangleMesh, SceneError>,
-) -> Result<Repaired, SceneError> {
+    atlas: impl FnOnce() -> Result<&'a TriangleMesh, DatasetError>,
+) -> Result<Repaired, DatasetError> {
     let range = range_of(map);
     let values: &[f32] = match texture.texels() {
         Texels::Linear(values) => values.as_flattened(),
@@ -435,7 +432,7 @@ mod tests {
         let bytes = Texture::new(8, 8, Texels::Grey8(vec![255; 64]), Wrap::Clamp).unwrap();
         assert_eq!(repaired(bytes.clone(), Map::Metallic, || panic!("asked")).unwrap(), Ok((bytes, None)));
         // The twin: a map with a bad texel does ask.
-        let error = || SceneError::Unsupported { path: "a".into(), what: "asked".to_owned() };
+        let error = || DatasetError::Unsupported { path: "a".into(), what: "asked".to_owned() };
         let bad = texture(Map::Metallic, SIDE, |at| if at == 0 { 2.0 } else { 0.5 });
         assert!(repaired(bad, Map::Metallic, || Err(error())).unwrap_err().to_string().contains("asked"));
     }

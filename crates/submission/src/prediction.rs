@@ -1,5 +1,4 @@
-//! The maps that a submission holds for one scene, ready to be rendered; and the hash of all of them, without decoding
-//! any.
+//! The maps that a submission holds for one scene, ready to be rendered.
 //!
 //! A missing or unusable map is replaced by a default, which is scored and reported as a finding. A map that the format
 //! makes optional may be missing without a finding.
@@ -7,16 +6,15 @@
 use std::path::Path;
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::Map;
-use mateval_dataset::{Finding, SceneError, SceneId, Severity};
+use mateval_dataset::{DatasetError, Finding, Severity};
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{Texels, Texture, Wrap};
 
 use crate::atlas::AtlasMeshes;
-use crate::error::{FileFault, SubmissionError, finding};
-use crate::files::{HashedFile, MapFolder, SubmissionJson, SubmittedFile, relative, submission_sha256};
-use crate::map_file::{self, MAX_MAP_BYTES, MapFile, default_value};
+use crate::error::{FileFault, finding};
+use crate::files::{HashedFile, MAX_MAP_BYTES, MapFolder, SubmittedFile, relative};
+use crate::map_file::{self, MapFile, default_value};
 
 /// Most bytes that the texels of a scene's maps may take in memory together.
 pub const MAX_SCENE_BYTES: usize = 8 << 30;
@@ -64,11 +62,11 @@ pub fn read_scene(
     submission: &Path,
     scene: &SceneFile,
     atlases: &AtlasMeshes<'_>,
-) -> Result<PredictedScene, SceneError> {
+) -> Result<PredictedScene, DatasetError> {
     let (memory, findings, files) = (MemoryBudget::of_scene(), Vec::new(), Vec::new());
     let mut reader = Reader { submission, scene, atlases, memory, findings, files };
     let instances = 0..scene.instances.len();
-    let materials = instances.map(|at| reader.material(at)).collect::<Result<Vec<_>, SceneError>>()?;
+    let materials = instances.map(|at| reader.material(at)).collect::<Result<Vec<_>, DatasetError>>()?;
     let Reader { findings, files, .. } = reader;
     Ok(PredictedScene { scattering_key: scattering_key(&materials), materials, findings, files })
 }
@@ -85,7 +83,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// The maps of the instance at a place of the scene; none without an atlas.
-    fn material(&mut self, at: usize) -> Result<Option<PredictedMaterial>, SceneError> {
+    fn material(&mut self, at: usize) -> Result<Option<PredictedMaterial>, DatasetError> {
         if self.scene.instances[at].atlas.is_none() {
             return Ok(None);
         }
@@ -95,7 +93,7 @@ impl Reader<'_> {
         Ok(Some(PredictedMaterial { base_color, roughness, metallic }))
     }
 
-    fn texture(&mut self, at: usize, map: Map) -> Result<Texture, SceneError> {
+    fn texture(&mut self, at: usize, map: Map) -> Result<Texture, DatasetError> {
         let (scene, instance) = (&self.scene.id, &self.scene.instances[at].id);
         let folder = MapFolder { submission: self.submission, scene, instance };
         let present = folder.present(map);
@@ -119,7 +117,7 @@ impl Reader<'_> {
     }
 
     /// The map of a file, or the finding that it is replaced. Fails only where the atlas cannot be read.
-    fn decoded(&mut self, path: &Path, at: usize, map: Map) -> Result<Result<Texture, Box<Finding>>, SceneError> {
+    fn decoded(&mut self, path: &Path, at: usize, map: Map) -> Result<Result<Texture, Box<Finding>>, DatasetError> {
         let atlases = self.atlases;
         let decoded = match self.read(path) {
             Ok(file) => map_file::decode(file, map, || atlases.mesh(at))?,
@@ -181,60 +179,6 @@ pub fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
         }
     }
     sha256_of_bytes(text.as_bytes())
-}
-
-/// What identifies a submission: enough to see whether a result belongs to it, without a look at what its files hold.
-pub struct HashedSubmission {
-    pub method: String,
-    /// As results of the same scenes have it; see [`submission_sha256`].
-    pub sha256: String,
-    pub maps: usize,
-}
-
-/// The files of a submission, each hashed once, from which the hash over any of its scenes follows.
-pub struct HashedFiles {
-    method: String,
-    json: HashedFile,
-    /// The maps of each scene, in the dataset's order.
-    scenes: Vec<(SceneId, Vec<HashedFile>)>,
-}
-
-impl HashedFiles {
-    /// Reads `submission.json` and the maps of these scenes; of all scenes if none is given.
-    pub fn read(submission: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<Self, SubmissionError> {
-        let json = SubmissionJson::read(submission)?;
-        let chosen = dataset.chosen_scenes(scenes)?;
-        let scenes = chosen.into_iter().map(|scene| (scene.id.clone(), map_hashes(submission, scene))).collect();
-        Ok(Self { method: json.file.method, json: json.hashed, scenes })
-    }
-
-    /// The submission as a result of the scenes for which `is_scored` holds identifies it.
-    pub fn over(&self, is_scored: impl Fn(&SceneId) -> bool) -> HashedSubmission {
-        let maps = self.scenes.iter().filter(|(scene, _)| is_scored(scene)).flat_map(|(_, maps)| maps);
-        let files: Vec<HashedFile> = std::iter::once(&self.json).chain(maps).cloned().collect();
-        HashedSubmission { method: self.method.clone(), sha256: submission_sha256(&files), maps: files.len() - 1 }
-    }
-}
-
-/// Hashes `submission.json` and the maps of these scenes. A result has the same hash if it was made of the same files.
-pub fn hashed_submission(
-    submission: &Path,
-    dataset: &Dataset,
-    scenes: &[SceneId],
-) -> Result<HashedSubmission, SubmissionError> {
-    Ok(HashedFiles::read(submission, dataset, scenes)?.over(|_| true))
-}
-
-/// The maps of a scene in the order of [`PredictedScene::files`]; those that cannot be read have no
-/// hash.
-fn map_hashes(submission: &Path, scene: &SceneFile) -> Vec<HashedFile> {
-    let with_atlas = scene.instances.iter().filter(|instance| instance.atlas.is_some());
-    let paths = with_atlas.flat_map(|instance| {
-        let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
-        Map::ALL.into_iter().flat_map(move |map| folder.present(map))
-    });
-    let read = paths.filter_map(|path| SubmittedFile::read(submission, &path, MAX_MAP_BYTES).ok());
-    read.map(|file| file.hashed).collect()
 }
 
 /// The memory that is left for the texels of a scene.

@@ -8,7 +8,7 @@ use mateval_dataset::reference::{LightIndex, MaterialIndex, SurfaceIndex};
 pub enum TracerError {
     /// The scene contradicts itself: fix the scene.
     #[error("invalid scene: {0}")]
-    InvalidScene(#[from] SceneFault),
+    InvalidScene(#[from] ElementFault),
     /// The arguments of a call contradict each other or the world: fix the call.
     #[error("invalid request: {0}")]
     InvalidRequest(#[from] RequestFault),
@@ -19,7 +19,7 @@ pub enum TracerError {
 
 /// A part of a scene that contradicts itself or the rest of the scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SceneFault {
+pub enum ElementFault {
     #[error("surface {}{}: {fault}", surface.0, quoted(name))]
     Surface {
         surface: SurfaceIndex,

@@ -37,7 +37,7 @@ pub mod world;
 
 pub use accel::Accel;
 pub use emitter::StageLight;
-pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
+pub use error::{ElementFault, ExceededLimit, LightFault, MaterialFault, RequestFault, SurfaceFault, TracerError};
 pub use light_basis::LightBasis;
 pub use path::{LightSampling, RenderSettings};
 pub use ray::{Hit, Ray, SurfaceHit, TriangleIndex};

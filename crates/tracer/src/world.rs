@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::accel::{Accel, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::{Bsdf, MaterialTables};
 use crate::emitter::{Emitters, StageLight, escape_share};
-use crate::error::{SceneFault, SurfaceFault, TracerError};
+use crate::error::{ElementFault, SurfaceFault, TracerError};
 use crate::ray::{Hit, Ray, SurfaceHit, TriangleIndex, TriangleRecord};
 use crate::sampling::unit_hash;
 
@@ -59,7 +59,7 @@ impl World {
         // Check surfaces; materials and lights are checked when their tables are built.
         for (index, surface) in scene.surfaces.iter().enumerate() {
             let located =
-                |fault| SceneFault::Surface { surface: SurfaceIndex(index), name: Some(surface.name.clone()), fault };
+                |fault| ElementFault::Surface { surface: SurfaceIndex(index), name: Some(surface.name.clone()), fault };
             check_surface(surface, scene.materials.len()).map_err(located)?;
         }
         let textures = scene.texture_list();

@@ -7,7 +7,7 @@ use glam::DVec2;
 use mateval_dataset::dataset::Instance;
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
-use mateval_dataset::{Camera, SceneError, glb, word_enum};
+use mateval_dataset::{Camera, DatasetError, glb, word_enum};
 use mateval_image::exr_io::read_linear;
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use mateval_light::candidates::{Candidate, add_candidates, sky_extent_deg};
@@ -97,7 +97,7 @@ fn photo(geometry: &SceneGeometry<'_>) -> Result<Picture<LinearRgb>, BaselineErr
     let photo = read_linear(&path)?;
     if !photo.same_size(&geometry.valid) {
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
-        return Err(SceneError::Unsupported { path, what }.into());
+        return Err(DatasetError::Unsupported { path, what }.into());
     }
     Ok(photo.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v.max(0.0)))))
 }
@@ -171,7 +171,7 @@ impl PartSurfaces {
         let instance_at: BTreeMap<&str, usize> =
             scene.instances.iter().enumerate().map(|(at, instance)| (instance.id.as_str(), at)).collect();
         let nodes = glb::read(&path)?;
-        let unsupported = |what: &str| SceneError::Unsupported { path: path.clone(), what: what.to_owned() };
+        let unsupported = |what: &str| DatasetError::Unsupported { path: path.clone(), what: what.to_owned() };
         if !nodes.iter().map(|node| node.name.as_str()).eq(scene.parts.iter().map(|part| part.id.as_str())) {
             return Err(unsupported("its nodes are not the parts of scene.json; run `mateval prep verify`").into());
         }

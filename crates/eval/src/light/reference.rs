@@ -8,9 +8,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::changes::change_scene;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::SCORER_JSON;
-use mateval_dataset::manifest::change_scene;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_dataset::scene_cost::{Step, TimedStep};

@@ -11,7 +11,7 @@ use crate::recipe::fault::RecipeSceneFault;
 
 /// Why a scene cannot be made.
 #[derive(Debug, thiserror::Error)]
-pub enum SceneFault {
+pub enum BuildFault {
     /// The recipe's entry of the scene is not valid.
     #[error(transparent)]
     Recipe(#[from] RecipeSceneFault),

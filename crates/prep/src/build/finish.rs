@@ -6,13 +6,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use mateval_dataset::changes::{self, SceneHashes};
 use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
 use mateval_dataset::layout::{BuildFolder, DATASET, SceneFolder, TARGETS, is_input_picture, is_rendered};
 use mateval_dataset::manifest;
-use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::open::{check_whole, read_dataset_file};
 use mateval_dataset::render_file::RENDER_FILE;
-use mateval_dataset::{Progress, RendererId, Report, SceneError, SceneId, json};
+use mateval_dataset::{DatasetError, Progress, RendererId, Report, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 use mateval_files::work_folder::remove;
@@ -62,10 +62,10 @@ fn finish_with(
     let all: Vec<SceneId> = recipe.scenes.iter().map(|entry| entry.id.clone()).collect();
     let unknown: Vec<SceneId> = without.iter().filter(|id| !all.contains(id)).cloned().collect();
     if !unknown.is_empty() {
-        return Err(SceneError::UnknownScenes { dataset: root.to_owned(), unknown, known: all }.into());
+        return Err(DatasetError::UnknownScenes { dataset: root.to_owned(), unknown, known: all }.into());
     }
     let _lease = build.lease_of_whole(&all)?;
-    manifest::remove_unfinished(&root.join("scenes"))?;
+    changes::remove_unfinished(&root.join("scenes"))?;
     let scenes: Vec<SceneId> = all.iter().filter(|id| !without.contains(id)).cloned().collect();
     if scenes.is_empty() {
         return Err(PrepError::unusable(root, "would have no scene left; leave one --without away"));
@@ -101,7 +101,7 @@ pub fn finish_again(root: &Path, progress: Progress<'_>) -> Result<DatasetFile, 
     let mut dataset = read_dataset_file(root)?;
     check_whole(root, &dataset)?;
     let _lease = BuildFolder::of(root).lease_of_whole(&dataset.scenes)?;
-    manifest::remove_unfinished(&root.join("scenes"))?;
+    changes::remove_unfinished(&root.join("scenes"))?;
     check_strays(root, &dataset.scenes)?;
     let known = scene_hashes(root, &mut dataset, CutOffRenders::Refused, progress)?;
     write(root, dataset, &known)
@@ -191,7 +191,7 @@ fn scene_hashes(
         lists.push((id, shown, list));
     }
     if !findings.is_empty() {
-        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+        return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
     for (id, shown, list) in &mut lists {
         if let Some(renderer) = shown {

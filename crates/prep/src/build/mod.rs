@@ -24,15 +24,15 @@ mod wide_views;
 
 use std::path::Path;
 
+use mateval_dataset::changes::SceneHashes;
 use mateval_dataset::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SourceFile};
 use mateval_dataset::glb::{self, GlbNode};
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::SceneFolder;
-use mateval_dataset::manifest::SceneHashes;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::reference::Surface;
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
-use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, TriangleMesh, json, reference};
+use mateval_dataset::{DatasetError, Finding, Progress, Report, SceneId, TriangleMesh, json, reference};
 use mateval_files::FileError;
 use mateval_files::work_folder::{WorkFolder, remove, remove_beside};
 use mateval_sources::source_scene::LicenceText;
@@ -41,7 +41,7 @@ use crate::atlas::cache::AtlasCache;
 use crate::error::PrepError;
 use crate::recipe::{self, Recipe, RecipeScene};
 use crate::render::BlenderOptions;
-use fault::{PinFault, SceneFault, above_notes};
+use fault::{BuildFault, PinFault, above_notes};
 use finish::finish_build;
 use materials::{AtlasSizes, InstanceAtlas, write_materials};
 use pictures::write_pictures;
@@ -102,7 +102,7 @@ fn chosen<'a>(options: &BuildOptions, recipe: &'a Recipe) -> Result<Vec<&'a Reci
     let unknown: Vec<SceneId> = options.scenes.iter().filter(|id| known().all(|k| k != **id)).cloned().collect();
     if !unknown.is_empty() {
         let dataset = options.recipe.clone();
-        return Err(SceneError::UnknownScenes { dataset, unknown, known: known().collect() }.into());
+        return Err(DatasetError::UnknownScenes { dataset, unknown, known: known().collect() }.into());
     }
     let is_chosen = |entry: &&RecipeScene| options.scenes.is_empty() || options.scenes.contains(&entry.id);
     Ok(recipe.scenes.iter().filter(is_chosen).collect())
@@ -172,7 +172,7 @@ fn build_scene(
     plan.findings.extend(unstated);
     if !is_lit(&plan, entry.exposure)? {
         let findings = above_notes(&[plan.findings.as_slice(), &seen.findings].concat());
-        return Err(PrepError::scene(&entry.id)(SceneFault::NoLight { lights: plan.scene.lights.len(), findings }));
+        return Err(PrepError::scene(&entry.id)(BuildFault::NoLight { lights: plan.scene.lights.len(), findings }));
     }
     let sizes = AtlasSizes { fixed: entry.atlas_size.or(recipe.atlas_size), nearest: &seen.nearest };
     let atlases = write_materials(&mut plan, folder, &sizes, cache, progress)?;
@@ -219,7 +219,7 @@ fn check_inputs(entry: &RecipeScene, files: &[SourceFile]) -> Result<(), PrepErr
     if faults.is_empty() {
         return Ok(());
     }
-    Err(PrepError::scene(&entry.id)(SceneFault::Pins { faults }))
+    Err(PrepError::scene(&entry.id)(BuildFault::Pins { faults }))
 }
 
 fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
@@ -232,7 +232,7 @@ fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
 }
 
 /// Writes `instances.glb` and, for each set of parts, its `parts.glb`.
-fn write_meshes(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) -> Result<(), SceneError> {
+fn write_meshes(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) -> Result<(), DatasetError> {
     let meshes: Vec<TriangleMesh> = plan
         .scene
         .surfaces

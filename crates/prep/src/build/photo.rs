@@ -14,7 +14,7 @@ use mateval_image::texture_io::Encoding;
 use mateval_image::{LinearRgb, Picture};
 use mateval_sources::source_scene::SourceScene;
 
-use super::fault::{PhotoFault, SceneFault};
+use super::fault::{BuildFault, PhotoFault};
 use crate::error::PrepError;
 use crate::recipe::RecipeScene;
 use crate::views::write_preview;
@@ -47,7 +47,7 @@ pub(super) fn read_photo(
     let root = entry.root(source);
     let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
     let photo = photo_of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
-    let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(SceneFault::Photo(fault)))?;
+    let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault)))?;
     scene.read.files.extend(folder.into_files());
     scene.read.files.hashes.dedup();
     if photo.transparent_share > 0.0 {

@@ -6,7 +6,7 @@ use mateval_image::exr_io::{self, Precision};
 use mateval_image::png_io;
 use mateval_tracer::World;
 
-use super::fault::{SceneFault, above_notes};
+use super::fault::{BuildFault, above_notes};
 use super::plan::Plan;
 use crate::error::PrepError;
 use crate::views::{GeometryPictures, Shown, TruthPictures, ViewScene, write_views};
@@ -29,7 +29,7 @@ impl Seen {
         if self.input_pixels.iter().any(|count| *count > 0) {
             return Ok(self);
         }
-        Err(PrepError::scene(scene)(SceneFault::NothingSeen { findings: above_notes(&plan.findings) }))
+        Err(PrepError::scene(scene)(BuildFault::NothingSeen { findings: above_notes(&plan.findings) }))
     }
 }
 

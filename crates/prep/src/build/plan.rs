@@ -13,7 +13,7 @@ use mateval_files::source_folder::SourceFolder;
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, SourceScene};
 use mateval_tracer::World;
 
-use super::fault::SceneFault;
+use super::fault::BuildFault;
 use super::labels::{MAX_LABEL_BYTES, read_labels};
 use super::parts::{InstanceEntry, PartEntry, PartSplit, list_instances};
 use super::photo::{ScenePhoto, read_photo};
@@ -65,7 +65,7 @@ pub(super) fn make_plan(
     mut source_scene: SourceScene,
 ) -> Result<(Plan, Vec<String>), PrepError> {
     if source_scene.read.scene.surfaces.is_empty() {
-        return Err(PrepError::scene(&entry.id)(SceneFault::NoSurfaces { findings: source_scene.read.findings }));
+        return Err(PrepError::scene(&entry.id)(BuildFault::NoSurfaces { findings: source_scene.read.findings }));
     }
     let instances =
         list_instances(&source_scene.read.scene, &source_scene.read.origins).map_err(PrepError::scene(&entry.id))?;
@@ -152,7 +152,7 @@ fn part_splits(
         }
     }
     if !faults.is_empty() {
-        return Err(PrepError::scene(&entry.id)(SceneFault::Labels { faults }));
+        return Err(PrepError::scene(&entry.id)(BuildFault::Labels { faults }));
     }
     read.files.extend(folder.into_files());
     splits.insert(0, own);

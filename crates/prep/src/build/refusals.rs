@@ -11,7 +11,7 @@ use mateval_dataset::{Finding, Severity};
 use mateval_sources::source_scene::Missing;
 use mateval_tracer::{LightBasis, RenderSettings, World, render_views};
 
-use super::fault::{SceneFault, above_notes};
+use super::fault::{BuildFault, above_notes};
 use super::pictures::Seen;
 use super::plan::Plan;
 use super::source::MOST_UNSTATED;
@@ -43,7 +43,7 @@ pub(super) fn check_missing(
     root: &Path,
     file: &str,
     findings: &[Finding],
-) -> Result<Option<Finding>, SceneFault> {
+) -> Result<Option<Finding>, BuildFault> {
     let Some(example) = missing.files.first() else { return Ok(None) };
     let (count, wanted) = (missing.files.len(), missing.wanted.max(1));
     let share = count as f64 / wanted as f64;
@@ -53,7 +53,7 @@ pub(super) fn check_missing(
     let message = format!("{count} of {wanted} {} are missing, such as '{example}'{elsewhere}", missing.what);
     if share > MOST_MISSING && !entry.allow_missing {
         let allowed = "missing, unless the recipe's scene has `allow_missing = true`";
-        return Err(SceneFault::TooMuch { message, most: MOST_MISSING, allowed, findings: above_notes(findings) });
+        return Err(BuildFault::TooMuch { message, most: MOST_MISSING, allowed, findings: above_notes(findings) });
     }
     Ok(Some(Finding::new(
         if share > FEW_MISSING { Severity::Warning } else { Severity::Note },
@@ -148,7 +148,7 @@ fn folders_below(root: &Path) -> Vec<PathBuf> {
 }
 
 /// The finding about base colours that are not stated, if any are. Fails where they cover too much of the picture.
-pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, SceneFault> {
+pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, BuildFault> {
     let all: usize = seen.input_pixels.iter().sum();
     let is_unstated = |at: &usize| !plan.origins[*at].stated.base_color && seen.input_pixels[*at] > 0;
     let mut unstated: Vec<usize> = (0..plan.instances.len()).filter(is_unstated).collect();
@@ -173,7 +173,7 @@ pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> R
                        exporter leaves out a white that is meant, write `allow_unstated = true` for the scene in the \
                        recipe";
         let findings = above_notes(&plan.findings);
-        return Err(SceneFault::TooMuch { message, most: MOST_UNSTATED, allowed, findings });
+        return Err(BuildFault::TooMuch { message, most: MOST_UNSTATED, allowed, findings });
     }
     Ok(Some(Finding::new(
         Severity::Warning,

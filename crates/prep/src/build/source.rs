@@ -19,7 +19,7 @@ use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceSc
 use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
-use super::fault::{BakeFault, SceneFault, above_notes};
+use super::fault::{BakeFault, BuildFault, above_notes};
 use crate::blender::bake::bake;
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
@@ -109,7 +109,7 @@ fn scene_of_file(
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
-fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result<Camera, SceneFault> {
+fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result<Camera, BuildFault> {
     let source = read.camera.ok_or_else(|| no_camera(read))?;
     let old = source.intrinsics;
     let [width, height] = picture_size(recipe, entry, [old.width, old.height])?;
@@ -129,13 +129,13 @@ fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Re
 }
 
 /// The recipe's resolution, or else the source's. Fails where that is out of range.
-fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[u32; 2], SceneFault> {
+fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[u32; 2], BuildFault> {
     let [width, height] = entry.resolution.or(recipe.resolution).unwrap_or(own);
     if [width, height].iter().all(|side| RESOLUTION.contains(side)) {
         return Ok([width, height]);
     }
     let (least, most) = RESOLUTION.into_inner();
-    Err(SceneFault::FilmSize { width, height, least, most })
+    Err(BuildFault::FilmSize { width, height, least, most })
 }
 
 /// The scene of the glTF at `path`, which the recipe names as `file`.
@@ -199,7 +199,7 @@ fn blend_scene(
 }
 
 /// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.
-fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result<Camera, SceneFault> {
+fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result<Camera, BuildFault> {
     let own_size = read.camera.map_or(DEFAULT_SIZE, |camera| [camera.intrinsics.width, camera.intrinsics.height]);
     let [width, height] = picture_size(recipe, entry, own_size)?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
@@ -211,17 +211,17 @@ fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, read: &FileScene) -> Result
     Ok(Camera { intrinsics: Intrinsics { width, height, fx: focal, fy: focal, cx, cy }, ..camera })
 }
 
-fn no_camera(read: &FileScene) -> SceneFault {
-    SceneFault::NoCameraInFile { findings: above_notes(&read.findings) }
+fn no_camera(read: &FileScene) -> BuildFault {
+    BuildFault::NoCameraInFile { findings: above_notes(&read.findings) }
 }
 
 /// A camera of the recipe, whose places are those of the source, in a scene from which `shift_m` was subtracted.
-fn given_camera(given: &GivenCamera, [width, height]: [u32; 2], shift_m: DVec3) -> Result<Camera, SceneFault> {
+fn given_camera(given: &GivenCamera, [width, height]: [u32; 2], shift_m: DVec3) -> Result<Camera, BuildFault> {
     let GivenCamera { position, target, fov_y_deg } = *given;
     let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
     let [position, target] = [position, target].map(|place| DVec3::from_array(place) - shift_m);
     let camera = Camera::look_at(position, target, DVec3::Y, intrinsics);
-    camera.ok_or(SceneFault::CameraDirection)
+    camera.ok_or(BuildFault::CameraDirection)
 }
 
 fn front3d_scene(
@@ -234,7 +234,7 @@ fn front3d_scene(
     let Some(number) = house.house.room(&room.room) else {
         let rooms: Vec<&str> = house.house.rooms.iter().map(|room| room.id.as_str()).collect();
         let (wanted, known) = (format!("room '{}'", room.room), quoted(&rooms));
-        return Err(PrepError::scene(&entry.id)(SceneFault::NotInHouse { wanted, known }));
+        return Err(PrepError::scene(&entry.id)(BuildFault::NotInHouse { wanted, known }));
     };
     // The camera sampler and the choice of surfaces that the views see share one world.
     let world = World::new(house.scene.clone())?;
@@ -262,7 +262,7 @@ fn room_camera(
     house: &FurnishedHouse,
     world: &World,
     room: usize,
-) -> Result<Camera, SceneFault> {
+) -> Result<Camera, BuildFault> {
     let resolution = entry.resolution.or(recipe.resolution).unwrap_or(recipe.camera_rules.resolution());
     match &entry.camera {
         None => Err(RecipeSceneFault::NoCamera.into()),
@@ -271,7 +271,7 @@ fn room_camera(
             let Some(camera) = house.cameras.iter().find(|camera| camera.number == *number) else {
                 let known: Vec<String> = house.cameras.iter().map(|camera| camera.number.to_string()).collect();
                 let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-                return Err(SceneFault::NotInHouse { wanted: format!("designer's camera {number}"), known });
+                return Err(BuildFault::NotInHouse { wanted: format!("designer's camera {number}"), known });
             };
             let (position, target) = (camera.position.to_array(), camera.target.to_array());
             given_camera(&GivenCamera { position, target, fov_y_deg: camera.fov_y_deg }, resolution, DVec3::ZERO)

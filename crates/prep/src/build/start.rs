@@ -184,7 +184,7 @@ pub(super) fn begin(
     }
     if place != Place::New {
         check_holds_none(out, &[&options.recipe, source])?;
-        let _whole = build.lease_of_all()?;
+        let _whole = build.lease_of_whole(&[])?;
         let old = put_aside(out)?;
         std::fs::create_dir_all(build.path()).map_err(FileError::io("make", build.path()))?;
         old.as_deref().map_or(Ok(()), remove)?;

@@ -6,13 +6,12 @@
 
 use std::path::Path;
 
+use mateval_dataset::changes::{SceneHashes, change_scene};
 use mateval_dataset::dataset::{DatasetFile, FORMAT, PREVIOUS_FORMAT};
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::manifest;
-use mateval_dataset::manifest::SceneHashes;
-use mateval_dataset::manifest::change_scene;
 use mateval_dataset::open::check_whole;
-use mateval_dataset::{Progress, Report, SceneError, SceneId, json};
+use mateval_dataset::{DatasetError, Progress, Report, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_files::whole::write_whole;
@@ -40,7 +39,7 @@ pub fn bring_up_to_date(root: &Path, progress: Progress<'_>) -> Result<bool, Pre
     }
     raise_file(&root.join(TARGETS))?;
     // From here on this version opens the dataset, and asks to finish it if this run is killed.
-    write_whole(&path, text.as_bytes()).map_err(SceneError::from)?;
+    write_whole(&path, text.as_bytes()).map_err(DatasetError::from)?;
     finish_again(root, progress)?;
     Ok(true)
 }
@@ -52,12 +51,12 @@ fn check_can_change(root: &Path, dataset: &DatasetFile) -> Result<(), PrepError>
     if dataset.geometry.is_some() {
         let what = "perturbed geometry in an old format; run `mateval prep perturb` on the dataset with the true geometry, \
                     whose identity changes too";
-        return Err(SceneError::Unsupported { path: root.to_owned(), what: what.to_owned() }.into());
+        return Err(DatasetError::Unsupported { path: root.to_owned(), what: what.to_owned() }.into());
     }
     let found = sha256_of_file(&root.join(MANIFEST))?;
     if found != dataset.manifest_sha256 {
         let what = format!("manifest_sha256 is {}, but MANIFEST.sha256 hashes to {found}", dataset.manifest_sha256);
-        return Err(SceneError::Unsupported { path: root.join(DATASET), what }.into());
+        return Err(DatasetError::Unsupported { path: root.join(DATASET), what }.into());
     }
     let mut findings = manifest::check_those(root, |file| !file.starts_with("scenes/"))?;
     let listed = manifest::entries(root)?;
@@ -69,7 +68,7 @@ fn check_can_change(root: &Path, dataset: &DatasetFile) -> Result<(), PrepError>
     findings.retain(|finding| !is_raised(&finding.file));
     match findings.is_empty() {
         true => Ok(()),
-        false => Err(SceneError::Invalid { path: root.to_owned(), findings }.into()),
+        false => Err(DatasetError::Invalid { path: root.to_owned(), findings }.into()),
     }
 }
 
@@ -122,7 +121,7 @@ impl JsonState {
 fn raise_file(path: &Path) -> Result<(), PrepError> {
     let bytes = std::fs::read(path).map_err(FileError::io("read", path))?;
     if format_of(&bytes).as_deref() == Some(PREVIOUS_FORMAT) {
-        write_whole(path, raised(path, &bytes)?.as_bytes()).map_err(SceneError::from)?;
+        write_whole(path, raised(path, &bytes)?.as_bytes()).map_err(DatasetError::from)?;
     }
     Ok(())
 }
@@ -136,7 +135,7 @@ fn raised(path: &Path, bytes: &[u8]) -> Result<String, PrepError> {
     }
     let what =
         format!("expected 'format' as the first key with the value '{PREVIOUS_FORMAT}'; build the dataset again");
-    Err(SceneError::Unsupported { path: path.to_owned(), what }.into())
+    Err(DatasetError::Unsupported { path: path.to_owned(), what }.into())
 }
 
 fn quoted(format: &str) -> String {

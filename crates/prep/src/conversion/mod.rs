@@ -17,7 +17,7 @@ use mateval_dataset::reference::{Emission, MaterialIndex, ReferenceScene};
 use mateval_dataset::{Finding, Severity};
 use mateval_tracer::bsdf::ReflectanceMeter;
 use mateval_tracer::repaint::SPECULAR;
-use mateval_tracer::{MaterialFault, SceneFault, TracerError};
+use mateval_tracer::{ElementFault, MaterialFault, TracerError};
 
 use base_color::{BaseColorRule, DerivedTextures};
 
@@ -48,7 +48,7 @@ pub fn convert(scene: ReferenceScene, file: &str) -> Result<Conversion, TracerEr
     for (index, material) in scene.materials.iter().enumerate() {
         let located = |fault| {
             let (material, name) = (MaterialIndex(index), material.name.clone());
-            TracerError::InvalidScene(SceneFault::Material { material, name, fault })
+            TracerError::InvalidScene(ElementFault::Material { material, name, fault })
         };
         materials.push(converter.material(material).map_err(located)?);
     }

@@ -16,7 +16,7 @@ use mateval_dataset::glb::{self, GlbNode};
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, is_ground_truth, is_input_picture};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::ReferenceScene;
-use mateval_dataset::{InstanceId, Progress, Report, SceneError, SceneId, TriangleMesh, json, manifest, reference};
+use mateval_dataset::{DatasetError, InstanceId, Progress, Report, SceneId, TriangleMesh, json, manifest, reference};
 use mateval_files::FileError;
 use mateval_files::work_folder::{WorkFolder, check_holds_none};
 use mateval_tracer::World;
@@ -62,7 +62,7 @@ pub fn perturb(
     progress(Report::step("hashes", 0, 1));
     let findings = manifest::check_those(root, |file| !is_ground_truth(file) || file.contains("/reference/"))?;
     if !findings.is_empty() {
-        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+        return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
     // The files that stay, then those of each scene.
     let work = WorkFolder::start(out)?;
@@ -143,7 +143,7 @@ fn write_scene(
     let mut reference = reference::read(from)?;
     let mut faults = Faults::default();
     let Some(meshes) = scene_meshes::check(from, scene, &mut faults) else {
-        return Err(SceneError::Invalid { path: from.path().to_owned(), findings: faults.all }.into());
+        return Err(DatasetError::Invalid { path: from.path().to_owned(), findings: faults.all }.into());
     };
     let motions: Vec<Option<Motion>> = scene
         .instances

@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
+use mateval_dataset::changes::change_scene;
 use mateval_dataset::dataset::View;
 use mateval_dataset::layout::{INPUT, SceneFolder};
-use mateval_dataset::manifest::change_scene;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
 use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json, word_enum};

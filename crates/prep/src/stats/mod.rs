@@ -13,7 +13,7 @@ use mateval_dataset::dataset::{DatasetVersion, Instance, SceneFile};
 use mateval_dataset::layout::DATASET;
 use mateval_dataset::material::MaterialParameter;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{Finding, FindingCount, Role, SceneError, SceneId, Severity, SourceKind};
+use mateval_dataset::{DatasetError, Finding, FindingCount, Role, SceneId, Severity, SourceKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -158,7 +158,7 @@ pub struct CategoryCount {
 pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, PrepError> {
     let findings = duplicates(dataset);
     if !findings.is_empty() {
-        return Err(SceneError::Invalid { path: dataset.root.clone(), findings }.into());
+        return Err(DatasetError::Invalid { path: dataset.root.clone(), findings }.into());
     }
     let scenes = &dataset.scenes;
     let per_scene: Vec<SceneStats> = scenes.iter().map(scene_stats).collect();

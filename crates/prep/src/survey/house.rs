@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SourceFile;
-use mateval_dataset::{FindingCount, SceneError, ids, json};
+use mateval_dataset::{FindingCount, ids, json};
 use mateval_files::FileError;
-use mateval_files::lease::{self, Lease};
+use mateval_files::lease::{Lease, LeaseSet};
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_files::work_folder::{WorkFolder, check_free, remove, remove_beside};
 use mateval_image::png_io::write_rgb_bytes;
@@ -215,25 +215,17 @@ impl SurveyFolder {
     }
 
     /// The right to search a house. Fails where another process does, or makes the whole survey.
-    pub(super) fn lease_of_house(&self, house: &HouseName) -> Result<Lease, SceneError> {
-        let lease = Lease::take(&self.lease(&format!("houses/{}", house.0)), &format!("house '{}'", house.0))?;
-        lease::check_free(&self.lease("whole"), "the survey")?;
-        Ok(lease)
+    pub(super) fn lease_of_house(&self, house: &HouseName) -> Result<Lease, FileError> {
+        self.leases().part(&house.0)
     }
 
     /// The right to make the whole survey. Fails where another process does, or searches a house.
-    pub(super) fn lease_of_whole(&self) -> Result<Lease, SceneError> {
-        let lease = Lease::take(&self.lease("whole"), "the survey")?;
-        let entries = std::fs::read_dir(self.lease("houses")).into_iter().flatten().flatten();
-        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        for name in names.filter(|name| !mateval_files::whole::is_temporary(name)) {
-            lease::check_free(&self.lease(&format!("houses/{name}")), &format!("house '{name}'"))?;
-        }
-        Ok(lease)
+    pub(super) fn lease_of_whole(&self) -> Result<Lease, FileError> {
+        self.leases().whole([])
     }
 
-    fn lease(&self, name: &str) -> PathBuf {
-        self.0.join(WORK).join("leases").join(name)
+    fn leases(&self) -> LeaseSet {
+        LeaseSet { folder: self.0.join(WORK).join("leases"), part: "house", whole: "the survey" }
     }
 
     /// Marks the survey as not finished, since what was found in a house may change. For the holder of a lease.
@@ -286,24 +278,6 @@ mod tests {
         let [one, other] = ["a/x.json", "b/x.json"].map(HouseName::new);
         assert!(one != other && one.0.starts_with("x-") && other.thumbnails().starts_with("thumbnails/x-"));
         assert_eq!(one, HouseName::new("a/x.json"));
-    }
-
-    /// Parts may be made side by side, but neither twice nor during the making of the whole.
-    #[test]
-    fn leases_exclude_each_other() {
-        let place = tempfile::tempdir().unwrap();
-        let folder = SurveyFolder::begin(&place.path().join("out"), false).unwrap();
-        let [one, other] = ["a.json", "b.json"].map(HouseName::new);
-        let first = folder.lease_of_house(&one).unwrap();
-        let second = folder.lease_of_house(&other).unwrap();
-        assert!(folder.lease_of_house(&one).unwrap_err().to_string().contains("is at work on house 'a-"));
-        assert!(folder.lease_of_whole().unwrap_err().to_string().contains("is at work on house '"));
-        drop((first, second));
-        let whole = folder.lease_of_whole().unwrap();
-        assert!(folder.lease_of_house(&one).unwrap_err().to_string().contains("is at work on the survey"));
-        assert!(folder.lease_of_whole().is_err());
-        drop(whole);
-        folder.lease_of_house(&one).unwrap();
     }
 
     #[test]

@@ -16,7 +16,7 @@ use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::manifest::is_withheld;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::open::{absent_scenes, is_below, read_dataset_file};
-use mateval_dataset::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference};
+use mateval_dataset::{DatasetError, Finding, Progress, Report, SceneId, Severity, changes, json, manifest, reference};
 use mateval_files::untrusted::sha256_of_file;
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
@@ -35,7 +35,7 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepE
     let mut faults = Faults::default();
     progress(Report::step("hashes", 0, 1));
     for scene in BuildFolder::of(root).changed() {
-        let command = manifest::finishing_command(root, std::slice::from_ref(&scene));
+        let command = changes::finishing_command(root, std::slice::from_ref(&scene));
         faults.all.push(Finding::new(
             Severity::Error,
             "unfinished",
@@ -72,7 +72,7 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepE
 /// A file of the dataset; or none, after adding the reason why it could not be read.
 fn read_json<T: DeserializeOwned>(name: &str, path: &Path, faults: &mut Faults) -> Option<T> {
     match json::read_format(path, FORMAT) {
-        Err(error @ SceneError::Format { .. }) => {
+        Err(error @ DatasetError::Format { .. }) => {
             faults.add("wrong_format", name, "/format", error.to_string());
             None
         }

@@ -30,7 +30,7 @@ use mateval_files::work_folder::check_free;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_metrics::Psnr;
-use mateval_submission::prediction::{HashedSubmission, hashed_submission};
+use mateval_submission::files::{HashedSubmission, hashed_submission};
 use rayon::prelude::*;
 
 use self::file::{AlignedBy, EXPLAIN_FORMAT, ExplainFile, InstanceExplanation, ViewShift};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
+use mateval_dataset::{DatasetError, Finding, SceneId, Severity, json};
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Track;
 use mateval_eval::result::key::{Region, ResultKey, Surfaces};
@@ -314,7 +314,7 @@ pub(super) fn is_in_curves(picture: &PictureValues) -> bool {
 }
 
 /// The entries of a folder with their types; a link is not followed.
-fn entries_of(folder: &Path) -> Result<Vec<(PathBuf, std::fs::FileType)>, SceneError> {
+fn entries_of(folder: &Path) -> Result<Vec<(PathBuf, std::fs::FileType)>, DatasetError> {
     let entry = |entry: std::io::Result<std::fs::DirEntry>| {
         let entry = entry?;
         Ok((entry.path(), entry.file_type()?))

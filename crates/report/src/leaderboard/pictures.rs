@@ -14,7 +14,7 @@ use mateval_eval::open_scene::scored_views;
 use mateval_files::FileError;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, SrgbRgb, png_io};
-use mateval_submission::prediction::HashedFiles;
+use mateval_submission::files::HashedFiles;
 use serde::Serialize;
 
 use super::entries::{LeaderboardPlan, Submissions};

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{Finding, SceneError, SceneId, Severity, json};
+use mateval_dataset::{DatasetError, Finding, SceneId, Severity, json};
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_files::FileError;
@@ -146,7 +146,7 @@ fn is_json(path: &Path) -> bool {
 }
 
 /// The entries of a folder, sorted.
-fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let io = || FileError::io("list", folder);
     let entries = std::fs::read_dir(folder).map_err(io())?;
     let mut paths: Vec<PathBuf> =

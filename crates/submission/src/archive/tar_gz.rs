@@ -14,7 +14,7 @@ use mateval_files::untrusted::shortened;
 use tar::{Archive, Entry, EntryType};
 
 use super::unpacked::{Budget, EntryKind, Fault, Writer};
-use crate::map_file::MAX_MAP_BYTES;
+use crate::files::MAX_MAP_BYTES;
 
 /// Longest name or list of attributes that precedes its entry, in bytes. It is held in memory.
 const LONGEST_EXTRA: u64 = 1 << 16;

@@ -7,7 +7,7 @@ use mateval_dataset::Finding;
 use mateval_files::untrusted::shortened;
 
 use crate::error::error;
-use crate::map_file::MAX_MAP_BYTES;
+use crate::files::MAX_MAP_BYTES;
 
 /// Most files and folders of a submission, packed or not.
 pub const MAX_ENTRIES: usize = 200_000;

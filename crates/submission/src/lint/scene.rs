@@ -9,7 +9,7 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::Map;
-use mateval_dataset::{Finding, InstanceId, SceneError, Severity};
+use mateval_dataset::{DatasetError, Finding, InstanceId, Severity};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Texture, Wrap};
 use rayon::prelude::*;
@@ -19,8 +19,8 @@ use super::map_headers::{self, Largest};
 use super::sight::{CoarseTexel, InstanceSight, Look, Pairs, ScalarLook, Sight, looks, scalar_looks};
 use crate::atlas::AtlasMeshes;
 use crate::error::{SubmissionError, error, note, warning};
-use crate::files::{MapFolder, SubmittedFile, relative};
-use crate::map_file::{self, MAX_MAP_BYTES, MapFile, MapHeader};
+use crate::files::{MAX_MAP_BYTES, MapFolder, SubmittedFile, relative};
+use crate::map_file::{self, MapFile, MapHeader};
 use crate::prediction::{MAX_SCENE_BYTES, MemoryBudget, compact_texture};
 
 /// Instances whose maps are in memory at once.
@@ -137,13 +137,13 @@ fn instance(
     at: usize,
     sight: &InstanceSight,
     atlases: &AtlasMeshes<'_>,
-) -> Result<InstanceFacts, SceneError> {
+) -> Result<InstanceFacts, DatasetError> {
     let instance = &scene.instances[at];
     let mut facts =
         InstanceFacts { folder: format!("scenes/{}/{}", scene.id, instance.id), ..InstanceFacts::default() };
     let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
     // None if the map is missing or cannot be used. Fails only where the dataset does.
-    let mut read = |map: Map| -> Result<Option<MapFile>, SceneError> {
+    let mut read = |map: Map| -> Result<Option<MapFile>, DatasetError> {
         // A missing map, and two files for one map, are findings of `folder`.
         let Ok([path]) = <[_; 1]>::try_from(folder.present(map)) else { return Ok(None) };
         let name = relative(submission, &path);

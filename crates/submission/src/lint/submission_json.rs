@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_dataset::{Finding, SceneError, Severity, json};
+use mateval_dataset::{DatasetError, Finding, Severity, json};
 use mateval_files::untrusted::{hint, nearest, shortened, without_mark};
 use serde_json::{Map, Value};
 
@@ -71,7 +71,7 @@ fn read(submission: &Path) -> Result<(Object, Vec<Finding>), Box<Finding>> {
     match serde_json::from_slice(bytes).map_err(bad)? {
         // Parsing the type finds what the object does not show: faults below its keys, and a key that occurs twice.
         Value::Object(object) => match json::parse::<SubmissionFile>(&path, bytes) {
-            Err(SceneError::Invalid { mut findings, .. }) if is_sound(&object) && !findings.is_empty() => {
+            Err(DatasetError::Invalid { mut findings, .. }) if is_sound(&object) && !findings.is_empty() => {
                 Err(Box::new(Finding {
                     action: "write it as dataset_spec/format/submission.md states".to_owned(),
                     ..findings.remove(0)

@@ -11,7 +11,7 @@ use glam::Vec3;
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::reference::SurfaceIndex;
 
-use crate::error::{ExceededLimit, RequestFault, SceneFault, SurfaceFault, TracerError};
+use crate::error::{ElementFault, ExceededLimit, RequestFault, SurfaceFault, TracerError};
 use crate::ray::{Hit, Ray, TriangleIndex};
 use kernel::{Portable, WIDTH};
 pub(crate) use kernel::{move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
@@ -236,7 +236,7 @@ fn flatten(meshes: &[&TriangleMesh]) -> Result<(Vec<[Vec3; 3]>, Vec<u32>), Trace
     let mut corners = Vec::with_capacity(total);
     let mut starts = vec![0];
     for (surface, mesh) in meshes.iter().enumerate() {
-        let fault = |fault| SceneFault::Surface { surface: SurfaceIndex(surface), name: None, fault };
+        let fault = |fault| ElementFault::Surface { surface: SurfaceIndex(surface), name: None, fault };
         check_positions(mesh).map_err(fault)?;
         corners.extend((0..mesh.triangles.len()).map(|index| mesh.corners(index)));
         starts.push(corners.len() as u32);

@@ -14,7 +14,7 @@ use super::blender_tables::BlenderTables;
 use super::facets::{diffuse_reflectance, eta_from_specular};
 use super::lobe::{Lobe, Table};
 use super::rough_coat::{RoughCoat, Widths};
-use crate::error::{MaterialFault, SceneFault};
+use crate::error::{ElementFault, MaterialFault};
 
 #[derive(Debug)]
 pub(crate) struct MaterialTables(Vec<Table>);
@@ -37,12 +37,12 @@ struct Known {
 
 impl MaterialTables {
     /// Checks the materials' parameters and computes their tables. Materials with equal parameters share a table.
-    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture]) -> Result<Self, SceneFault> {
+    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture]) -> Result<Self, ElementFault> {
         let mut known = Known::default();
         let mut tables = Vec::with_capacity(scene.materials.len());
         for (index, material) in scene.materials.iter().enumerate() {
             let located =
-                |fault| SceneFault::Material { material: MaterialIndex(index), name: material.name.clone(), fault };
+                |fault| ElementFault::Material { material: MaterialIndex(index), name: material.name.clone(), fault };
             check(material, textures.len()).map_err(located)?;
             tables.push(table(material, &mut known));
         }

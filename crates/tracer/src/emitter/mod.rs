@@ -18,7 +18,7 @@ use mateval_dataset::reference::{Emission, LightIndex, ReferenceScene, SurfaceIn
 use mateval_image::Texture;
 
 use crate::accel::Accel;
-use crate::error::{LightFault, RequestFault, SceneFault, TracerError};
+use crate::error::{ElementFault, LightFault, RequestFault, TracerError};
 use crate::ray::{Ray, SurfaceHit};
 use crate::sampling::{self, Frame, Sampler};
 use area::{AreaEmitter, LANES, Outlines, RadianceMap, SurfaceEmission};
@@ -131,7 +131,7 @@ impl Emitters {
         for (index, group) in scene.lights.iter().enumerate() {
             emitters
                 .add(scene, textures, LightIndex(index), &group.emission, count <= SEPARATE_SURFACES)
-                .map_err(|fault| SceneFault::Light { light: LightIndex(index), name: group.name.clone(), fault })?;
+                .map_err(|fault| ElementFault::Light { light: LightIndex(index), name: group.name.clone(), fault })?;
         }
         emitters.outlines = Outlines::new(&emitters.areas);
         emitters.share_between(1.0);
@@ -173,7 +173,7 @@ impl Emitters {
     pub(crate) fn with_stage(mut self, stage: &[StageLight]) -> Result<Self, TracerError> {
         let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
         let accel = Accel::build(&meshes).map_err(|error| match error {
-            TracerError::InvalidScene(SceneFault::Surface { surface, fault, .. }) => {
+            TracerError::InvalidScene(ElementFault::Surface { surface, fault, .. }) => {
                 RequestFault::StageMesh { light: LightIndex(surface.0), fault }.into()
             }
             other => other,

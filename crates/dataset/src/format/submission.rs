@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::Perturbation;
 use crate::ids::{InstanceId, SceneId};
-use crate::{Finding, SceneError, Severity, json};
+use crate::{DatasetError, Finding, Severity, json};
 
 pub const SUBMISSION: &str = "submission.json";
 
@@ -53,12 +53,12 @@ pub struct SubmissionFile {
 impl SubmissionFile {
     /// Parses the bytes of a submission's file; `path` is for the error alone. Fails where its format is another one,
     /// and where a number is out of range.
-    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, DatasetError> {
         let file: Self = json::parse_format(path, bytes, SUBMISSION_FORMAT)?;
         let findings = file.numbers_out_of_range();
         match findings.is_empty() {
             true => Ok(file),
-            false => Err(SceneError::Invalid { path: path.to_owned(), findings }),
+            false => Err(DatasetError::Invalid { path: path.to_owned(), findings }),
         }
     }
 

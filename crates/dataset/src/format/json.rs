@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::ser::{Formatter, PrettyFormatter};
 use serde_path_to_error::Segment;
 
-use crate::SceneError;
+use crate::DatasetError;
 
 /// Largest JSON file that is read, in bytes.
 const MAX_JSON_BYTES: u64 = 256 << 20;
@@ -25,7 +25,7 @@ pub fn to_text<T: Serialize>(value: &T) -> String {
 }
 
 /// Writes the file whole.
-pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
+pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), DatasetError> {
     Ok(write_whole(path, to_text(value).as_bytes())?)
 }
 
@@ -39,7 +39,7 @@ pub fn to_lines<T: Serialize>(value: &T) -> String {
 }
 
 /// Writes the file whole, as [`to_lines`].
-pub fn write_lines<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
+pub fn write_lines<T: Serialize>(path: &Path, value: &T) -> Result<(), DatasetError> {
     Ok(write_whole(path, to_lines(value).as_bytes())?)
 }
 
@@ -96,23 +96,23 @@ fn separate<W: ?Sized + Write>(writer: &mut W, first: bool) -> io::Result<()> {
 }
 
 /// Reads a file; what does not fit is an error with its JSON pointer, line and column.
-pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
+pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, DatasetError> {
     parse(path, &read_at_most(path, MAX_JSON_BYTES).map_err(FileError::io("read", path))?)
 }
 
-/// Reads a file of the format `expected`. Another format is [`SceneError::Format`], whatever else differs from what
+/// Reads a file of the format `expected`. Another format is [`DatasetError::Format`], whatever else differs from what
 /// this version reads.
-pub fn read_format<T: DeserializeOwned>(path: &Path, expected: &'static str) -> Result<T, SceneError> {
+pub fn read_format<T: DeserializeOwned>(path: &Path, expected: &'static str) -> Result<T, DatasetError> {
     let text = read_at_most(path, MAX_JSON_BYTES).map_err(FileError::io("read", path))?;
     parse_format(path, &text, expected)
 }
 
 /// Parses the bytes of a file of the format `expected`; `path` is for the error alone.
-pub fn parse_format<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &'static str) -> Result<T, SceneError> {
+pub fn parse_format<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &'static str) -> Result<T, DatasetError> {
     // A text without a format, or without JSON, fails below.
     match serde_json::from_slice::<Head>(without_mark(text)) {
         Ok(head) if head.format != expected => {
-            Err(SceneError::Format { path: path.to_owned(), found: shortened(&head.format), expected })
+            Err(DatasetError::Format { path: path.to_owned(), found: shortened(&head.format), expected })
         }
         _ => parse(path, text),
     }
@@ -124,7 +124,7 @@ struct Head {
 }
 
 /// Parses the bytes of a file; `path` is for the error alone.
-pub fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, SceneError> {
+pub fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, DatasetError> {
     let text = without_mark(text);
     // Following the JSON path costs time, so only a text that is known to be bad is parsed that way.
     serde_json::from_slice(text)
@@ -144,8 +144,8 @@ fn pointer<T: DeserializeOwned>(text: &[u8]) -> String {
     steps.map(|step| format!("/{step}")).collect()
 }
 
-fn invalid(path: &Path, place: String, message: String) -> SceneError {
-    SceneError::invalid(
+fn invalid(path: &Path, place: String, message: String) -> DatasetError {
+    DatasetError::invalid(
         path,
         "bad_json",
         place,

@@ -3,10 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::SceneError;
 use crate::ids::{InstanceId, PartSetId, RendererId, SceneId, ViewId};
-use mateval_files::lease::{self, Lease};
-use mateval_files::{FileError, work_folder};
 
 pub const DATASET: &str = "dataset.json";
 pub const TARGETS: &str = "targets.json";
@@ -185,77 +182,5 @@ impl BuildFolder {
     /// The place of a scene that was left out of the dataset.
     pub fn left_out(&self, scene: &SceneId) -> PathBuf {
         self.0.join("left_out").join(scene.as_str())
-    }
-
-    /// The right to change a scene. Fails where another process changes it or finishes the dataset.
-    pub fn lease_of_scene(&self, scene: &SceneId) -> Result<Lease, SceneError> {
-        let (path, what) = self.scene_lease(scene);
-        let lease = Lease::take(&path, &what)?;
-        let (path, what) = self.whole_lease();
-        lease::check_free(&path, &what)?;
-        Ok(lease)
-    }
-
-    /// The right to write the files that describe the whole dataset. Fails where another process does so, or changes
-    /// one of its scenes.
-    pub fn lease_of_whole(&self, scenes: &[SceneId]) -> Result<Lease, SceneError> {
-        let (path, what) = self.whole_lease();
-        let lease = Lease::take(&path, &what)?;
-        for scene in scenes {
-            let (path, what) = self.scene_lease(scene);
-            lease::check_free(&path, &what)?;
-        }
-        Ok(lease)
-    }
-
-    /// The right to replace the dataset as a whole. Fails where another process works on anything of it.
-    pub fn lease_of_all(&self) -> Result<Lease, SceneError> {
-        let entries = std::fs::read_dir(self.0.join("leases/scenes")).into_iter().flatten().flatten();
-        let ids = entries.filter_map(|entry| SceneId::new(entry.file_name().to_str()?).ok());
-        self.lease_of_whole(&ids.collect::<Vec<_>>())
-    }
-
-    /// The right to begin or change the build; waits for other processes, which need it for a moment.
-    pub fn lease_of_start(&self) -> Result<Lease, SceneError> {
-        Ok(Lease::wait(&self.0.join("leases/start"), "the start of the build")?)
-    }
-
-    /// The right to write the dataset's `compare.json`; waits for other processes, which need it for a moment.
-    pub fn lease_of_verdict(&self) -> Result<Lease, SceneError> {
-        Ok(Lease::wait(&self.0.join("leases/verdict"), "the dataset's compare.json")?)
-    }
-
-    fn scene_lease(&self, scene: &SceneId) -> (PathBuf, String) {
-        (self.0.join("leases/scenes").join(scene.as_str()), format!("scene '{scene}'"))
-    }
-
-    fn whole_lease(&self) -> (PathBuf, String) {
-        (self.0.join("leases/whole"), "the dataset's manifest".to_owned())
-    }
-
-    /// Notes that the scene is about to differ from what the manifest lists.
-    pub fn note_change(&self, scene: &SceneId) -> Result<(), SceneError> {
-        let path = self.changed_folder();
-        std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
-        let path = path.join(scene.as_str());
-        Ok(std::fs::write(&path, "").map_err(FileError::io("write", path))?)
-    }
-
-    /// The scenes that differ from what the manifest lists.
-    pub fn changed(&self) -> Vec<SceneId> {
-        let Ok(entries) = std::fs::read_dir(self.changed_folder()) else { return Vec::new() };
-        let mut changed: Vec<SceneId> =
-            entries.flatten().filter_map(|entry| SceneId::new(entry.file_name().to_str()?).ok()).collect();
-        changed.sort();
-        changed
-    }
-
-    /// Notes that the manifest lists all scenes as they are.
-    pub fn forget_changes(&self) -> Result<(), SceneError> {
-        Ok(work_folder::remove(&self.changed_folder())?)
-    }
-
-    fn changed_folder(&self) -> PathBuf {
-        self.0.join("changed")
     }
 }

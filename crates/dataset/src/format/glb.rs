@@ -11,7 +11,7 @@ use json::validation::{Checked, USize64};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
 
-use crate::SceneError;
+use crate::DatasetError;
 use crate::gltf_file::{GltfError, indices, numbers, triangles};
 use crate::mesh::TriangleMesh;
 
@@ -26,12 +26,12 @@ pub struct GlbNode {
 }
 
 /// Writes the nodes in their order. The same nodes give the same bytes.
-pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), SceneError> {
+pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), DatasetError> {
     let bytes: u64 =
         nodes.iter().map(|node| 32 * node.mesh.positions.len() as u64 + 12 * node.mesh.triangles.len() as u64).sum();
     if bytes > MAX_GLB_BYTES - (64 << 20) {
         let what = format!("{bytes} bytes of geometry; a .glb holds at most 4 GiB; split the scene");
-        return Err(SceneError::Unsupported { path: path.to_owned(), what });
+        return Err(DatasetError::Unsupported { path: path.to_owned(), what });
     }
     let mut file = Writer::default();
     file.root.push(plain_material());
@@ -185,7 +185,7 @@ impl Writer {
 
 /// Reads every node that has a mesh, in the file's order. Fails where positions or uv are not finite or an index is out
 /// of range.
-pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
+pub fn read(path: &Path) -> Result<Vec<GlbNode>, DatasetError> {
     let length = std::fs::metadata(path).map_err(FileError::io("read", path))?.len();
     if length > MAX_GLB_BYTES {
         return Err(invalid(path, "", format!("{length} bytes; expected at most {MAX_GLB_BYTES}")));
@@ -239,9 +239,9 @@ fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, buffers: &[&[u8]]) -> R
     }
 }
 
-fn invalid(path: &Path, node: &str, message: String) -> SceneError {
+fn invalid(path: &Path, node: &str, message: String) -> DatasetError {
     let place = if node.is_empty() { String::new() } else { format!("node '{node}'") };
-    SceneError::invalid(path, "bad_geometry", place, message, "fetch or build the dataset again")
+    DatasetError::invalid(path, "bad_geometry", place, message, "fetch or build the dataset again")
 }
 
 #[cfg(test)]

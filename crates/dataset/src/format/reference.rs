@@ -21,7 +21,7 @@ use crate::glb::{self, GlbNode};
 use crate::layout::SceneFolder;
 use crate::material::{Lookup, Material, MaterialModel, TextureIndex, UvTransform};
 use crate::mesh::TriangleMesh;
-use crate::{Finding, SceneError, Severity, json};
+use crate::{DatasetError, Finding, Severity, json};
 
 /// An index of [`ReferenceScene::materials`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -272,7 +272,7 @@ pub struct LightsFile {
 }
 
 /// Writes the scene below the scene's `ground_truth`.
-pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneError> {
+pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), DatasetError> {
     let reference = folder.reference();
     let textures = write_textures(&reference, &scene.textures)?;
     let nodes: Vec<GlbNode> = scene
@@ -290,7 +290,7 @@ pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneEr
 }
 
 /// Writes the source's own materials below the reference scene.
-pub fn write_source_materials(folder: &SceneFolder, source: &SourceMaterials) -> Result<(), SceneError> {
+pub fn write_source_materials(folder: &SceneFolder, source: &SourceMaterials) -> Result<(), DatasetError> {
     let place = folder.source_materials();
     let textures = write_textures(&place, &source.textures)?;
     let file = SourceMaterialsFile { format: FORMAT.to_owned(), materials: source.materials.clone(), textures };
@@ -299,7 +299,7 @@ pub fn write_source_materials(folder: &SceneFolder, source: &SourceMaterials) ->
 
 /// Reads the files of [`write_source_materials`]; absent if the scene has none. Every index out of range is a finding
 /// of the error; `count` is the number of the scene's materials.
-pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Option<SourceMaterials>, SceneError> {
+pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Option<SourceMaterials>, DatasetError> {
     let place = folder.source_materials();
     let path = place.join(SOURCE_MATERIALS);
     if !path.exists() {
@@ -312,7 +312,7 @@ pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Optio
     }
     faults.check_materials(SOURCE_MATERIALS, &file.materials, &file.textures);
     if !faults.0.is_empty() {
-        return Err(SceneError::Invalid { path, findings: faults.0 });
+        return Err(DatasetError::Invalid { path, findings: faults.0 });
     }
     let textures = read_textures(&place, &file.textures)?;
     Ok(Some(SourceMaterials { materials: file.materials, textures }))
@@ -322,7 +322,7 @@ pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Optio
 pub const SOURCE_MATERIALS: &str = "materials.json";
 
 /// Reads the files of [`write()`]. Every index out of range is a finding of the error.
-pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
+pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, DatasetError> {
     let reference = folder.reference();
     let path = reference.join("reference.json");
     let file: ReferenceFile = json::read_format(&path, FORMAT)?;
@@ -330,7 +330,7 @@ pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
     let nodes = glb::read(&reference.join("geometry.glb"))?;
     let faults = dangling(&file, &lights, nodes.len());
     if !faults.is_empty() {
-        return Err(SceneError::Invalid { path, findings: faults });
+        return Err(DatasetError::Invalid { path, findings: faults });
     }
     let textures = read_textures(&reference, &file.textures)?;
     let surfaces = file
@@ -343,17 +343,17 @@ pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
 }
 
 /// Writes textures to the folder `textures` in `place`, which is made.
-fn write_textures(place: &Path, textures: &[SourceTexture]) -> Result<Vec<TextureEntry>, SceneError> {
+fn write_textures(place: &Path, textures: &[SourceTexture]) -> Result<Vec<TextureEntry>, DatasetError> {
     let folder = place.join("textures");
     std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
     textures.iter().enumerate().map(|(index, source)| write_texture(&folder, index, source)).collect()
 }
 
-fn read_textures(place: &Path, entries: &[TextureEntry]) -> Result<Vec<SourceTexture>, SceneError> {
+fn read_textures(place: &Path, entries: &[TextureEntry]) -> Result<Vec<SourceTexture>, DatasetError> {
     entries.iter().map(|entry| read_texture_entry(place, entry)).collect()
 }
 
-fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<TextureEntry, SceneError> {
+fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<TextureEntry, DatasetError> {
     let texture = &source.texture;
     let (width, height) = (texture.width(), texture.height());
     let stem = folder.join(format!("{index:04}"));
@@ -390,7 +390,7 @@ fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<
     Ok(TextureEntry { file, source: source.name.clone(), source_sha256: source.sha256.clone(), texels, wrap })
 }
 
-fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTexture, SceneError> {
+fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTexture, DatasetError> {
     let path = reference.join("textures").join(&entry.file);
     let wrap = entry.wrap;
     let texture = match entry.texels {
@@ -470,13 +470,13 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
 
 /// Reads all instances as opaque surfaces with the uv of their atlases, in the order of `scene.json`. Fails where
 /// `instances.glb` cannot be read or holds other instances than `scene.json`.
-pub fn read_plain(folder: &SceneFolder, scene: &SceneFile) -> Result<ReferenceScene, SceneError> {
+pub fn read_plain(folder: &SceneFolder, scene: &SceneFile) -> Result<ReferenceScene, DatasetError> {
     let path = folder.instances();
     let nodes = glb::read(&path)?;
     let ids = scene.instances.iter().map(|instance| instance.id.as_str());
     if !(nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids)) {
         let what = "its nodes are not the instances of scene.json; run `mateval prep verify`".to_owned();
-        return Err(SceneError::Unsupported { path, what });
+        return Err(DatasetError::Unsupported { path, what });
     }
     let surface = |node: glb::GlbNode| Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) };
     let grey = Material::new("", MaterialModel::grey(0.5));

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::layout::BuildFolder;
-use crate::{RendererId, SceneError, SceneId, json};
+use crate::{DatasetError, RendererId, SceneId, json};
 use mateval_files::{FileError, work_folder};
 
 /// The format of this version of the file.
@@ -62,7 +62,7 @@ pub struct TimedStep<'a> {
 }
 
 /// The costs recorded for a scene of the dataset in `root`; empty where there are none.
-pub fn read(root: &Path, scene: &SceneId) -> Result<Vec<StepCost>, SceneError> {
+pub fn read(root: &Path, scene: &SceneId) -> Result<Vec<StepCost>, DatasetError> {
     let path = BuildFolder::of(root).cost(scene);
     if !path.exists() {
         return Ok(Vec::new());
@@ -71,13 +71,13 @@ pub fn read(root: &Path, scene: &SceneId) -> Result<Vec<StepCost>, SceneError> {
 }
 
 /// Forgets the costs of a scene that is about to be built again.
-pub fn forget(root: &Path, scene: &SceneId) -> Result<(), SceneError> {
+pub fn forget(root: &Path, scene: &SceneId) -> Result<(), DatasetError> {
     Ok(work_folder::remove(&BuildFolder::of(root).cost(scene))?)
 }
 
 /// Does the work and, if it succeeds, adds its cost to those recorded. The caller holds the scene's lease. A record
 /// that cannot be read fails before the work.
-pub fn timed<T, E: From<SceneError>>(
+pub fn timed<T, E: From<DatasetError>>(
     root: &Path,
     scene: &SceneId,
     timed: &TimedStep<'_>,
@@ -99,7 +99,7 @@ pub fn timed<T, E: From<SceneError>>(
     Ok(done)
 }
 
-fn write(root: &Path, scene: &SceneId, steps: Vec<StepCost>) -> Result<(), SceneError> {
+fn write(root: &Path, scene: &SceneId, steps: Vec<StepCost>) -> Result<(), DatasetError> {
     let path = BuildFolder::of(root).cost(scene);
     let folder = path.parent().unwrap_or(root);
     std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
@@ -146,7 +146,7 @@ fn ticks(stat: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    fn run(root: &Path, step: Step, is_alone: bool, works: bool) -> Result<(), SceneError> {
+    fn run(root: &Path, step: Step, is_alone: bool, works: bool) -> Result<(), DatasetError> {
         let scene = SceneId::new("room").unwrap();
         let renderer = RendererId::new("blender").unwrap();
         let renderer = (step == Step::Render).then_some(&renderer);
@@ -182,7 +182,7 @@ mod tests {
         std::fs::write(&path, "{}").unwrap();
         let mut worked = false;
         let step = TimedStep { step: Step::Build, renderer: None, is_alone: true };
-        let failed: Result<(), SceneError> = timed(root.path(), &SceneId::new("room").unwrap(), &step, || {
+        let failed: Result<(), DatasetError> = timed(root.path(), &SceneId::new("room").unwrap(), &step, || {
             worked = true;
             Ok(())
         });

@@ -8,9 +8,9 @@ use mateval_image::{LinearRgb, Picture};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::changes::SceneHashes;
 use crate::layout::{is_input_picture, is_rendered};
-use crate::manifest::SceneHashes;
-use crate::{RendererId, SceneError, SceneId, ViewId};
+use crate::{DatasetError, RendererId, SceneId, ViewId};
 use mateval_files::untrusted::sha256_of_bytes;
 
 /// The name of the file. It is written last, so its presence means that a view's pictures are complete.
@@ -96,7 +96,7 @@ pub struct ScorerFile {
 
 /// SHA-256, hex, of names and hashes of all files of a scene from which light is rendered, as the manifest lists them,
 /// or, of a scene that was built since, as it was built.
-pub fn light_inputs_sha256(root: &Path, scene: &SceneId) -> Result<String, SceneError> {
+pub fn light_inputs_sha256(root: &Path, scene: &SceneId) -> Result<String, DatasetError> {
     let hashes = SceneHashes::open(root, scene)?;
     // The input picture is a copy of a render.
     let is_input = |file: &str| !is_rendered(file) && !is_input_picture(file);

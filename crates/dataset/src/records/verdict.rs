@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::layout::{BuildFolder, COMPARE};
-use crate::{SceneError, SceneId, json};
+use crate::{DatasetError, SceneId, json};
 
 /// The version in the dataset's `compare.json`.
 pub const VERDICT_FORMAT: &str = "mateval-compare/1";
@@ -41,7 +41,7 @@ pub struct CompareCounts {
 
 impl VerdictFile {
     /// The file of the dataset in `root`; absent if it does not exist. It may be about an earlier state of the dataset.
-    pub fn read_beside(root: &Path) -> Result<Option<Self>, SceneError> {
+    pub fn read_beside(root: &Path) -> Result<Option<Self>, DatasetError> {
         let path = root.join(COMPARE);
         if !path.exists() {
             return Ok(None);
@@ -52,7 +52,7 @@ impl VerdictFile {
     /// Adds the scenes to the file of the dataset in `root`, and replaces those that it lists. Scenes that were
     /// compared by another version, or before the dataset changed, are dropped. Several processes may compare scenes of
     /// one dataset.
-    pub fn add_beside(self, root: &Path) -> Result<(), SceneError> {
+    pub fn add_beside(self, root: &Path) -> Result<(), DatasetError> {
         let _lease = BuildFolder::of(root).lease_of_verdict()?;
         let mut file = self;
         // A file that cannot be read is replaced: it can be made again.
