@@ -46,6 +46,14 @@ pub enum ReportError {
     /// The dataset has no ground truth that could be withheld.
     #[error("'{}' has no ground truth to withhold", path.display())]
     NoGroundTruth { path: PathBuf },
+    /// The truth of scenes can be made again from public files, however it is packed.
+    #[error(
+        "'{}' cannot be kept secret: {} of its scenes {}, have the materials of their source, so that anybody who has \
+         the source can make the truth again; redress them (`redress` in the recipe), or add --open-book to withhold \
+         the truth without claiming that it is secret",
+        path.display(), scenes.len(), named(scenes)
+    )]
+    OpenBook { path: PathBuf, scenes: Vec<SceneId> },
     /// A key or signature in a file cannot be read or used.
     #[error("'{}' is not a key as `mateval key new` and minisign write it, or has a password: {reason}", path.display())]
     BadKey { path: PathBuf, reason: String },
@@ -92,6 +100,12 @@ impl ReportError {
     pub(crate) fn refuse(mismatches: Vec<Mismatch>) -> Result<(), Self> {
         if mismatches.is_empty() { Ok(()) } else { Err(Self::Mismatch(mismatches)) }
     }
+}
+
+/// The first of the scenes, by name.
+fn named(scenes: &[SceneId]) -> String {
+    let names: Vec<&str> = scenes.iter().take(3).map(SceneId::as_str).collect();
+    format!("({}{})", names.join(", "), if scenes.len() > names.len() { ", ..." } else { "" })
 }
 
 fn joined(mismatches: &[Mismatch]) -> String {

@@ -9,7 +9,7 @@ use mateval_export::mitsuba::export_view;
 use mateval_export::{ExportOptions, Exported, Format, croissant, export};
 use mateval_files::work_folder::{check_free, is_inside};
 use mateval_prep::recipe::{self, RECIPE};
-use mateval_report::publish::publish;
+use mateval_report::publish::{Published, publish};
 use mateval_report::release::file::Day;
 use mateval_report::release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
 
@@ -28,9 +28,13 @@ pub struct PublishArgs {
     /// Folder for the public files: the dataset without the withheld part.
     #[arg(long, requires = "withhold")]
     public: Option<PathBuf>,
-    /// Folder for the withheld files. Copied over the public folder they give the dataset again.
+    /// Folder for the withheld files. Copied over the public folder they give the whole dataset.
     #[arg(long, requires = "withhold")]
     private: Option<PathBuf>,
+    /// Withhold the truth of scenes that can be made again from public files, too: the dataset, its page and boards then
+    /// say "truth withheld, not secret".
+    #[arg(long, requires = "withhold")]
+    open_book: bool,
     #[command(flatten)]
     report: ReportArgs,
     /// Replace folders that already exist.
@@ -86,11 +90,9 @@ impl PublishArgs {
             check_report(options, &halves)?;
         }
         let release = options.as_ref().map(CheckedRelease::new).transpose().context("cannot report on the release")?;
-        if let Some([public, private]) = halves {
-            split(self, public, private)?;
-        }
+        let published = halves.map(|[public, private]| split(self, public, private)).transpose()?;
         let Some(release) = release else { return Ok(Outcome::Good) };
-        let file = with_progress(|progress| release.write(TOOL, progress)).context("cannot report on the release")?;
+        let file = with_progress(|progress| release.write(TOOL, published.as_ref(), progress)).context("cannot report on the release")?;
         print(&summary(self, &file))?;
         Ok(if file.is_good() { Outcome::Good } else { Outcome::No })
     }
@@ -102,7 +104,6 @@ fn release_options(args: &PublishArgs) -> Option<ReleaseOptions> {
         dataset: args.dataset.clone(),
         out: of.report.clone()?,
         force: args.force,
-        withhold: args.withhold.is_some(),
         verdicts: of.verdicts.clone(),
         ceiling: of.ceiling.clone(),
         floor: of.floor.clone(),
@@ -147,17 +148,19 @@ fn check_report(options: &ReleaseOptions, halves: &Option<[&PathBuf; 2]>) -> any
     Ok(())
 }
 
-fn split(args: &PublishArgs, public: &Path, private: &Path) -> anyhow::Result<()> {
-    let found = with_progress(|progress| publish(&args.dataset, public, private, progress))
+fn split(args: &PublishArgs, public: &Path, private: &Path) -> anyhow::Result<Published> {
+    let found = with_progress(|progress| publish(&args.dataset, public, private, args.open_book, progress))
         .context("cannot publish the dataset")?;
     print(&format!(
-        "{}: {}\n{}: {}\ncommitment {}\n",
+        "{}: {}, {}\n{}: {}\ncommitment {}\n",
         public.display(),
         counted(found.public_files, "file"),
+        found.secrecy.text(),
         private.display(),
         counted(found.private_files, "file"),
-        found.commitment_sha256
-    ))
+        found.commitment
+    ))?;
+    Ok(found)
 }
 
 /// One line: where the report lies, and what it states.

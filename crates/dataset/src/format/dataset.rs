@@ -41,8 +41,31 @@ pub struct DatasetFile {
     /// one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<PerturbedGeometry>,
+    /// Whether its ground truth is withheld and what that is worth; absent where it is not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub withheld: Option<Secrecy>,
     /// SHA-256 of MANIFEST.sha256, hex. The manifest holds every file but itself and this one.
     pub manifest_sha256: String,
+}
+
+/// What it is worth that the ground truth of a dataset is withheld.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Secrecy {
+    /// No scene's truth follows from public files.
+    Secret,
+    /// The truth of some scenes follows from public files: withheld, not secret.
+    NotSecret,
+}
+
+impl Secrecy {
+    /// As pages and tables say it.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Secret => "truth withheld",
+            Self::NotSecret => "truth withheld, not secret",
+        }
+    }
 }
 
 impl DatasetFile {

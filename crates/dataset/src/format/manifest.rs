@@ -1,12 +1,14 @@
-//! `MANIFEST.sha256`: a line `<sha256>  <path>` for each file, sorted by path, in the format of `sha256sum -c`.
+//! `MANIFEST.sha256`: a line `<sha256>  <path>` for each file, sorted by path, in the format of `sha256sum -c`; that of a
+//! hidden split also names the files that it withholds (`withheld`).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_files::whole::{is_abandoned, is_temporary, write_whole};
 use mateval_files::{FileError, work_folder};
 
+use super::withheld::{Line, SECRET, Secret, WITHHELD};
 use crate::layout::{COMPARE, DATASET, MANIFEST};
 use crate::{DatasetError, Finding, Severity};
 
@@ -20,11 +22,12 @@ pub fn is_withheld(root: &Path, finding: &Finding) -> bool {
     finding.code == MISSING_FILE && folder.is_some_and(|folder| !folder.exists())
 }
 
-/// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json` and hidden files
-/// in `root` itself. Links to folders are not followed.
+/// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json`, what the manifest
+/// of a hidden split leaves out, and hidden files in `root` itself. Links to folders are not followed.
 pub fn list_files(root: &Path) -> Result<Vec<String>, DatasetError> {
     let mut files = list_below(root, Path::new(""))?;
-    files.retain(|file| ![MANIFEST, DATASET, COMPARE].contains(&file.as_str()) && !file.starts_with('.'));
+    let unlisted = [MANIFEST, DATASET, COMPARE, WITHHELD, SECRET];
+    files.retain(|file| !unlisted.contains(&file.as_str()) && !file.starts_with('.'));
     Ok(files)
 }
 
@@ -75,6 +78,11 @@ pub fn write(root: &Path) -> Result<String, DatasetError> {
 
 /// Like [`write()`], without reading the files whose hashes are `known` by their paths in the dataset.
 pub fn write_with(root: &Path, known: &BTreeMap<String, String>) -> Result<String, DatasetError> {
+    if root.join(WITHHELD).exists() {
+        let what = "a hidden split is never changed, since its commitment would be broken; change the dataset that it was \
+                    made from, and publish that again";
+        return Err(DatasetError::Unsupported { path: root.to_owned(), what: what.to_owned() });
+    }
     let mut text = String::new();
     remove_abandoned(&root.join("scenes"))?;
     for file in list_files(root)?.into_iter().filter(|file| !file.split('/').any(is_temporary)) {
@@ -103,11 +111,99 @@ impl Entry {
     }
 }
 
-/// The valid lines of the manifest in their order; [`check`] reports the others.
+/// What the manifest of a dataset lists.
+#[derive(Clone, Debug, Default)]
+pub struct Manifest {
+    /// The files whose hashes are known, in the order of the lists.
+    pub entries: Vec<Entry>,
+    /// The names of withheld files whose hashes do not lie here.
+    pub withheld: Vec<String>,
+    /// The commitment of a hidden split.
+    pub commitment: Option<String>,
+    /// What is wrong with its lines, or with the list of withheld files.
+    faults: Vec<Finding>,
+}
+
+impl Manifest {
+    /// Reads the manifest of the dataset in `root`, and the list of withheld files if it lies beside it.
+    pub fn read(root: &Path) -> Result<Self, DatasetError> {
+        let text_of = |name: &str| {
+            let path = root.join(name);
+            std::fs::read_to_string(&path).map_err(FileError::io("read", &path))
+        };
+        let mut found = Self::default();
+        for (number, line) in text_of(MANIFEST)?.lines().enumerate() {
+            match (Entry::parse(line), Line::parse(line)) {
+                (Some(entry), _) => found.entries.push(entry),
+                (None, Some(Line::Name(file))) if is_inside(file) => found.withheld.push(file.to_owned()),
+                (None, Some(Line::Commitment(hash))) => found.commitment = Some(hash.to_owned()),
+                (None, _) => found.faults.push(bad_line(MANIFEST, number)),
+            }
+        }
+        if !root.join(WITHHELD).is_file() {
+            return Ok(found);
+        }
+        let list = text_of(WITHHELD)?;
+        for (number, line) in list.lines().enumerate() {
+            match Entry::parse(line).filter(|entry| found.withheld.contains(&entry.file)) {
+                Some(entry) => found.entries.push(entry),
+                None => found.faults.push(bad_line(WITHHELD, number)),
+            }
+        }
+        let known: BTreeSet<&String> = found.entries.iter().map(|entry| &entry.file).collect();
+        found.withheld.retain(|file| !known.contains(file));
+        found.faults.extend(found.withheld.iter().map(|file| {
+            fault("bad_manifest_line", WITHHELD, String::new(), &format!("it lacks '{file}', which the manifest names"))
+        }));
+        if root.join(SECRET).is_file() {
+            let secret = Secret::read(&root.join(SECRET))?;
+            found.faults.extend(found.broken_commitment(&secret, list.as_bytes()));
+        }
+        Ok(found)
+    }
+
+    fn broken_commitment(&self, secret: &Secret, list: &[u8]) -> Option<Finding> {
+        let found = secret.commitment(list);
+        let message = match &self.commitment {
+            Some(stated) if *stated == found => return None,
+            Some(stated) => format!("the commitment to it is {found} under this secret, published was {stated}"),
+            None => "the manifest holds no commitment".to_owned(),
+        };
+        Some(fault("broken_commitment", WITHHELD, String::new(), &message))
+    }
+}
+
+/// Checks that the list of withheld files, which lies in `root`, is the one that was committed to when the split was
+/// published: by the secret that its keeper published later.
+pub fn check_opened(root: &Path, secret: &Secret) -> Result<Option<Finding>, DatasetError> {
+    let path = root.join(WITHHELD);
+    let list = std::fs::read(&path).map_err(FileError::io("read", &path))?;
+    Ok(Manifest::read(root)?.broken_commitment(secret, &list))
+}
+
+fn bad_line(file: &str, number: usize) -> Finding {
+    let expected = match file {
+        MANIFEST => "expected '<sha256>  <path inside the dataset>'",
+        _ => "expected '<sha256>  <path>' of a file that the manifest names as withheld",
+    };
+    fault("bad_manifest_line", file, format!("line {}", number + 1), expected)
+}
+
+/// The lines of entries, as a manifest and the list of withheld files hold them.
+pub fn lines(entries: &[Entry]) -> String {
+    entries.iter().map(|entry| format!("{}  {}\n", entry.sha256, entry.file)).collect()
+}
+
+/// The text of a hidden split's manifest: the lines of public files, the names of the withheld ones, and the
+/// commitment.
+pub fn public_lines(public: &[Entry], withheld: &[Entry], commitment: &str) -> String {
+    let names: String = withheld.iter().map(|entry| format!("{}\n", Line::Name(&entry.file))).collect();
+    format!("{}{names}{}\n", lines(public), Line::Commitment(commitment))
+}
+
+/// The files whose hashes are known, in the order of the lists; [`check`] reports what is wrong with the lists.
 pub fn entries(root: &Path) -> Result<Vec<Entry>, DatasetError> {
-    let path = root.join(MANIFEST);
-    let text = std::fs::read_to_string(&path).map_err(FileError::io("read", &path))?;
-    Ok(text.lines().filter_map(Entry::parse).collect())
+    Ok(Manifest::read(root)?.entries)
 }
 
 /// Compares every file with the manifest: each one that is missing, changed or not listed is a finding.
@@ -117,25 +213,10 @@ pub fn check(root: &Path) -> Result<Vec<Finding>, DatasetError> {
 
 /// Compares those files with the manifest that `concerns` accepts by their paths in the dataset.
 pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, DatasetError> {
-    let path = root.join(MANIFEST);
-    let text = std::fs::read_to_string(&path).map_err(FileError::io("read", &path))?;
-    let mut findings = Vec::new();
-    let mut listed = std::collections::BTreeSet::new();
-    for (number, line) in text.lines().enumerate() {
-        let Some(Entry { sha256: hash, file }) = Entry::parse(line) else {
-            let place = format!("line {}", number + 1);
-            findings.push(fault(
-                "bad_manifest_line",
-                MANIFEST,
-                place,
-                "expected '<sha256>  <path inside the dataset>'",
-            ));
-            continue;
-        };
-        if !concerns(&file) {
-            continue;
-        }
-        listed.insert(file.clone());
+    let manifest = Manifest::read(root)?;
+    let mut findings = manifest.faults;
+    let mut listed = BTreeSet::new();
+    for Entry { sha256: hash, file } in manifest.entries.into_iter().filter(|entry| concerns(&entry.file)) {
         match sha256_of_file(&root.join(&file)) {
             Err(error) if root.join(&file).exists() => {
                 findings.push(fault("unreadable", &file, String::new(), &error.to_string()));
@@ -143,6 +224,16 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
             Err(_) => findings.push(missing_file(&file)),
             Ok(found) if found != hash => findings.push(changed_file(&file, &found, &hash)),
             Ok(_) => {}
+        }
+        listed.insert(file);
+    }
+    for file in manifest.withheld.into_iter().filter(|file| concerns(file)) {
+        if root.join(&file).exists() {
+            let message = format!("its hash is withheld, and '{WITHHELD}' is missing, which lies with the withheld files");
+            findings.push(fault("unlisted_file", &file, String::new(), &message));
+            listed.insert(file);
+        } else {
+            findings.push(missing_file(&file));
         }
     }
     for file in list_files(root)? {

@@ -7,3 +7,4 @@ pub mod layout;
 pub mod manifest;
 pub mod reference;
 pub mod submission;
+pub mod withheld;

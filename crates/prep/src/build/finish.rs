@@ -85,6 +85,7 @@ fn finish_with(
         photo_renderer: None,
         licences: Vec::new(),
         geometry: None,
+        withheld: None,
         manifest_sha256: String::new(),
     };
     for id in &dataset.scenes {

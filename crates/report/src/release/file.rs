@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use mateval_dataset::dataset::DatasetFile;
+use mateval_dataset::dataset::{DatasetFile, Secrecy};
 use mateval_dataset::scene_cost::StepCost;
 use mateval_dataset::{Finding, RendererId, SceneId, Severity};
 use mateval_prep::stats::StatsFile;
@@ -55,8 +55,8 @@ pub struct ReleaseFile {
     pub floor: Option<ReferenceScores>,
     /// How the RGB truth was rendered.
     pub rendered: Vec<RenderedWith>,
-    /// How to make the dataset again.
-    pub remake: Remake,
+    /// How to make the dataset again; null where the ground truth is withheld.
+    pub remake: Option<Remake>,
     /// The licences of the sources.
     pub licences: Vec<SharedLicence>,
     /// Scenes whose source came without a licence.
@@ -84,8 +84,10 @@ pub struct ReleasedDataset {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Withheld {
-    /// SHA-256 of the manifest's lines of the withheld files, in hexadecimal.
-    pub commitment_sha256: String,
+    /// What that is worth.
+    pub secrecy: Secrecy,
+    /// HMAC-SHA256, in hexadecimal, of the hashes of the withheld files: that of the public manifest.
+    pub commitment: String,
 }
 
 /// The verdict of `prep verify`.
@@ -114,10 +116,11 @@ pub struct ReleasedScene {
     pub noise: Option<Vec<ViewNoise>>,
     /// What making it has cost; empty where that was not recorded.
     pub costs: Vec<StepCost>,
-    /// What was wrong with its source and what was done instead, as in `scene.json`.
+    /// What was wrong with its source and what was done instead, as in `scene.json`; empty where the ground truth is
+    /// withheld.
     pub findings: Vec<Finding>,
-    /// The files of its source.
-    pub inputs: SceneInputs,
+    /// The files of its source; null where the ground truth is withheld.
+    pub inputs: Option<SceneInputs>,
 }
 
 impl ReleaseFile {
@@ -259,12 +262,15 @@ fn escaped(text: &str) -> String {
 pub(crate) const NOT_SHOWN: &str = "not shown, since the ground truth is withheld";
 
 /// Removes from a report what must not become public while the ground truth is withheld.
-pub(crate) fn withhold(file: &mut ReleaseFile, commitment_sha256: String) {
-    file.withheld = Some(Withheld { commitment_sha256 });
+pub(crate) fn withhold(file: &mut ReleaseFile, secrecy: Secrecy, commitment: &str) {
+    file.withheld = Some(Withheld { secrecy, commitment: commitment.to_owned() });
+    file.remake = None;
     file.verification.findings.iter_mut().for_each(silence);
     [&mut file.ceiling, &mut file.floor].into_iter().flatten().for_each(only_means);
     for scene in &mut file.scenes {
         scene.noise = None;
+        scene.findings.clear();
+        scene.inputs = None;
         if let Some(verdict) = &mut scene.comparison {
             verdict.faults = None;
         }

@@ -24,10 +24,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::manifest::Manifest;
 use mateval_dataset::open::{Dataset, check_outside};
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
 use mateval_files::whole::write_whole;
 use mateval_files::work_folder::{WorkFolder, check_free, check_holds_none};
+use mateval_prep::recipe::RECIPE;
 use mateval_prep::{stats, verify};
 
 pub use file::{Publication, ReleaseFile};
@@ -39,7 +41,7 @@ use renders::{noise, rendered_with, write_thumbnail};
 use table_one::Evaluated;
 
 use crate::error::ReportError;
-use crate::publish::commitment;
+use crate::publish::Published;
 
 /// What to describe, and where to write the report.
 #[derive(Clone, Debug, Default)]
@@ -48,8 +50,6 @@ pub struct ReleaseOptions {
     pub out: PathBuf,
     /// Replace a report that already exists.
     pub force: bool,
-    /// Whether the ground truth is withheld. It is in any case if the dataset's folder does not hold it.
-    pub withhold: bool,
     /// Files of `prep compare`, or folders of them.
     pub verdicts: Vec<PathBuf>,
     /// The result of the truth itself.
@@ -92,13 +92,25 @@ impl<'a> CheckedRelease<'a> {
     }
 
     /// Verifies the dataset and writes the report, completely or not at all. `tool` is the name and version that it
-    /// records.
-    pub fn write(&self, tool: &str, progress: Progress<'_>) -> Result<ReleaseFile, ReportError> {
+    /// records, and `published` the split that was made of the dataset. What would show withheld files is left out.
+    pub fn write(
+        &self,
+        tool: &str,
+        published: Option<&Published>,
+        progress: Progress<'_>,
+    ) -> Result<ReleaseFile, ReportError> {
         let findings = verify::verify(&self.options.dataset, progress)?;
         // The caller may have written folders since.
         check_place(self.options)?;
         let work = WorkFolder::start(&self.options.out)?;
-        let file = self.gather(tool, findings, work.path(), progress)?;
+        let mut file = self.gather(tool, findings, work.path(), progress)?;
+        if let Some(published) = published {
+            file.dataset.manifest_sha256.clone_from(&published.manifest_sha256);
+            withhold(&mut file, published.secrecy, &published.commitment);
+        } else if let Some(secrecy) = self.dataset.file.withheld {
+            let commitment = Manifest::read(&self.dataset.root)?.commitment.unwrap_or_default();
+            withhold(&mut file, secrecy, &commitment);
+        }
         json::write(&work.path().join(RELEASE), &file)?;
         write_whole(&work.path().join("index.html"), page(&file).as_bytes())?;
         work.finish()?;
@@ -120,7 +132,7 @@ impl<'a> CheckedRelease<'a> {
             progress(Report::step("pictures", at, dataset.scenes.len()));
             scenes.push(self.scene(scene, out)?);
         }
-        let mut file = ReleaseFile {
+        Ok(ReleaseFile {
             format: RELEASE_FORMAT.to_owned(),
             tool: tool.to_owned(),
             dataset: ReleasedDataset {
@@ -137,16 +149,12 @@ impl<'a> CheckedRelease<'a> {
             verification: Verification { sound, findings },
             ceiling: self.bounds.ceiling.clone(),
             floor: self.bounds.floor.clone(),
-            remake: Remake::of(dataset, &rendered)?,
+            remake: dataset.root.join(RECIPE).is_file().then(|| Remake::of(dataset, &rendered)).transpose()?,
             rendered,
             licences: licences(&dataset.file),
             without_licence: without_licence(&dataset.file),
             scenes,
-        };
-        if self.options.withhold || self.lacks_truth() {
-            withhold(&mut file, commitment(&dataset.root)?);
-        }
-        Ok(file)
+        })
     }
 
     fn scene(&self, scene: &SceneFile, out: &Path) -> Result<ReleasedScene, ReportError> {
@@ -158,13 +166,8 @@ impl<'a> CheckedRelease<'a> {
             noise: noise(&self.dataset, scene)?,
             costs: scene_cost::read(&self.dataset.root, &scene.id)?,
             findings: scene.findings.clone(),
-            inputs: SceneInputs::of(scene),
+            inputs: Some(SceneInputs::of(scene)).filter(|inputs| inputs.files > 0),
         })
-    }
-
-    /// Whether the ground truth of any scene is withheld from this copy of the dataset.
-    fn lacks_truth(&self) -> bool {
-        self.dataset.scenes.iter().any(|scene| !self.dataset.folder(&scene.id).truth().is_dir())
     }
 }
 

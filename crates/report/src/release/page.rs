@@ -50,7 +50,7 @@ pub(crate) fn page(file: &ReleaseFile) -> String {
     let columns = SHOWN_SCORES.map(|(title, _)| title);
     let values = context! {
         title => format!("{} {}", file.dataset.name, file.dataset.version),
-        file => Serde(file), scenes => Serde(&sorted), headlines => Serde(headlines(file)),
+        file => Serde(file), secrecy => file.withheld.as_ref().map(|withheld| withheld.secrecy.text()), scenes => Serde(&sorted), headlines => Serde(headlines(file)),
         failures => Serde(failures), whole => whole_findings(file), not_given => Serde(not_given(file)),
         table_one => Serde(rows(&file.stats, file.evaluated)), columns, bounds => Serde(bounds(file)),
         is_good => file.is_good(),
@@ -293,12 +293,12 @@ mod tests {
             ceiling: Some(scores("gt", 49.0, ids())),
             floor: Some(scores("grey", 9.5, ids())),
             rendered: Vec::new(),
-            remake: Remake {
+            remake: Some(Remake {
                 tool: "mateval 0".to_owned(),
                 recipe_sha256: String::new(),
                 recipe: "name = \"made-up\"".to_owned(),
                 commands: vec!["mateval prep build recipe.toml --source SOURCE --out DATASET".to_owned()],
-            },
+            }),
             licences: Vec::new(),
             without_licence: ids().collect(),
             scenes,
@@ -372,7 +372,7 @@ mod tests {
             noise: Some(["input", "up_left", "up_right", "down_left", "down_right"].iter().map(view).collect()),
             costs: vec![cost(Step::Build, 40.0), cost(Step::Render, 1800.0), cost(Step::Scorer, 300.0)],
             findings: (0..at % 7).map(note).collect(),
-            inputs: SceneInputs { files: 40, sha256: "0123456789abcdef".repeat(4) },
+            inputs: Some(SceneInputs { files: 40, sha256: "0123456789abcdef".repeat(4) }),
         }
     }
 
