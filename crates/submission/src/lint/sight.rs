@@ -314,7 +314,8 @@ mod tests {
     #[test]
     fn turns_find_the_texel_that_was_moved() {
         let written = |texels: [f32; 4]| Texture::new(2, 2, Texels::Grey(texels.into()), Wrap::Clamp).unwrap();
-        let upper_left = SeenPixel { uvs: [[0.25, 0.75]; 4], photo: None, tile: 0 };
+        let upper_left = SeenPixel { uvs: [[0.25, 0.75]; 4], photo: None,
+        redressed: None, tile: 0 };
         let files = [[1.0, 2.0, 3.0, 4.0], [3.0, 4.0, 1.0, 2.0], [2.0, 1.0, 4.0, 3.0], [4.0, 3.0, 2.0, 1.0]];
         for (turn, file) in Turn::ALL.into_iter().zip(files) {
             assert_eq!(mean(&written(file), &upper_left, turn)[0], 1.0, "{turn:?}");
