@@ -1,78 +1,261 @@
-//! A hidden split: two trees of one dataset, and a commitment that no other truth matches.
+//! A hidden split: two trees of one dataset, a commitment that no other truth matches, and the ways in which truth was
+//! once read out of public files: by making it again, by looking its hashes up, out of results, and out of exports.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-use super::command::{Run, baseline, run, run_words, score, verify};
-use super::sample::{copied_dataset, dataset, files_below, manifest};
-use mateval_testkit::copy_folder;
+use mateval_files::untrusted::sha256_of_bytes;
+use mateval_image::transfer::srgb_from_linear;
+use mateval_image::{Picture, png_io};
+use mateval_testkit::{copy_folder, kept_folder};
 
-fn publish(dataset: &Path, out: &Path) -> Run {
-    let (public, private) = (out.join("public"), out.join("private"));
-    let words = ["prep", "publish", "--withhold", "ground_truth", "--public"].map(Path::new);
-    run_words(words.into_iter().chain([public.as_path(), Path::new("--private"), private.as_path(), dataset]))
+use super::command::{Run, baseline, build, mateval, render, run, run_words, score, verify};
+use super::sample::{SMALL, dataset, files_below, json, manifest, recipe_text, unrendered};
+
+/// `mateval prep publish DATASET --withhold ground_truth` into folders of `out`, with further words.
+fn publish(dataset: &Path, out: &Path, words: &[&str]) -> Run {
+    let mut command = mateval();
+    command.args(["prep", "publish", "--withhold", "ground_truth", "--public"]).arg(out.join("public"));
+    run(command.arg("--private").arg(out.join("private")).arg(dataset).args(words))
 }
+
+/// A folder with the redressed room in `dataset`, its split in `public` and `private`, both together in `whole`, and
+/// the split's commitment in `commitment`.
+static SPLIT: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("split");
+    run_words([Path::new("sample"), &folder.join("source")]).ends_with(0);
+    std::fs::write(folder.join("key"), [3; 32]).unwrap();
+    let recipe = folder.join("source/redressed.toml");
+    let text = recipe_text(SMALL, &["room"]) + "redress = { key = \"../key\" }\n";
+    std::fs::write(&recipe, text).unwrap();
+    run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
+    run(&mut render(&folder.join("dataset"), 1)).ends_with(0);
+    let published = publish(&folder.join("dataset"), &folder, &[]).ends_with(0);
+    std::fs::write(folder.join("commitment"), commitment(&published)).unwrap();
+    copy_folder(&folder.join("public"), &folder.join("whole"));
+    copy_folder(&folder.join("private"), &folder.join("whole"));
+    folder
+});
 
 fn commitment(run: &Run) -> &str {
     run.stdout.lines().find_map(|line| line.strip_prefix("commitment ")).unwrap()
 }
 
+/// The bytes of every file below a folder.
+fn contents(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    files_below(root).into_iter().map(|file| (file.clone(), std::fs::read(root.join(file)).unwrap())).collect()
+}
+
+fn holds(text: &[u8], part: &[u8]) -> bool {
+    text.windows(part.len()).any(|window| window == part)
+}
+
 #[test]
-fn the_two_trees_together_are_the_dataset() {
-    let out = tempfile::tempdir().unwrap();
-    let published = publish(dataset(), out.path()).ends_with(0);
-    let [public, private] = ["public", "private"].map(|name| out.path().join(name));
-    let (shown, hidden) = (files_below(&public), files_below(&private));
+fn both_trees_together_are_a_whole_dataset_of_the_same_identity() {
+    let [public, private, whole] = ["public", "private", "whole"].map(|name| SPLIT.join(name));
     let is_truth = |path: &Path| path.components().nth(2).is_some_and(|part| part.as_os_str() == "ground_truth");
-    assert!(shown.len() > 20 && !shown.iter().any(|path| is_truth(path)), "{shown:?}");
-    assert!(hidden.len() > 20 && hidden.iter().all(|path| is_truth(path)), "{hidden:?}");
-    assert_eq!(manifest(&public), manifest(dataset()));
-    run(&mut verify(&public)).ends_with(0);
-    // The public tree is enough to make submissions.
-    let [grey, nn, result] = ["grey", "nn", "grey.json"].map(|name| out.path().join(name));
-    run(&mut baseline("grey", &public, &grey)).ends_with(0);
-    run(baseline("nn", &public, &nn).args(["--estimate", "input"])).ends_with(0);
-    run(&mut score(&grey, &public, &result)).ends_with(2).says("this needs the whole dataset");
-    // The commitment can be computed from the public tree.
-    let lines = manifest(&public);
-    let lines: String =
-        lines.lines().filter(|line| line.contains("/ground_truth/")).map(|line| format!("{line}\n")).collect();
-    assert_eq!(commitment(&published), mateval_files::untrusted::sha256_of_bytes(lines.as_bytes()));
-    copy_folder(&private, &public);
-    // What `prep` keeps for itself is not published.
-    let whole: Vec<_> = files_below(dataset()).into_iter().filter(|file| !file.starts_with(".build")).collect();
-    assert_eq!(files_below(&public), whole);
-    for file in whole {
-        assert!(
-            std::fs::read(public.join(&file)).unwrap() == std::fs::read(dataset().join(&file)).unwrap(),
-            "{file:?}"
-        );
+    assert!(!files_below(&public).iter().any(|path| is_truth(path)));
+    let others: Vec<_> = files_below(&private).into_iter().filter(|path| !is_truth(path)).collect();
+    assert_eq!(others, ["commitment.secret", "recipe.toml", "withheld.sha256"].map(PathBuf::from));
+    assert_eq!(manifest(&public), manifest(&whole));
+    for dataset in [&public, &whole] {
+        run(&mut verify(dataset)).ends_with(0);
     }
-}
-
-#[test]
-fn another_truth_has_another_commitment() {
-    let (out, changed) = (tempfile::tempdir().unwrap(), copied_dataset());
-    let published = publish(dataset(), &out.path().join("a")).ends_with(0);
-    let truth = changed.path().join("scenes/room/ground_truth/lights.json");
-    std::fs::write(&truth, std::fs::read_to_string(&truth).unwrap() + " ").unwrap();
-    // The files do not match the manifest: nothing is published.
-    publish(changed.path(), &out.path().join("b")).ends_with(2).says("changed_file");
-    assert!(!out.path().join("b").exists() || files_below(&out.path().join("b")).is_empty());
-    mateval_dataset::manifest::write(changed.path()).unwrap();
-    let other = publish(changed.path(), &out.path().join("b")).ends_with(0);
-    assert_ne!(commitment(&published), commitment(&other));
-}
-
-#[test]
-fn nothing_is_overwritten_and_the_two_folders_must_differ() {
+    // Every file of the original but its lists is in one of both, as it was; `scene.json` lies in the private one.
+    for (file, bytes) in contents(&SPLIT.join("dataset")) {
+        let name = file.to_string_lossy().replace('\\', "/");
+        let place = if name == "scenes/room/scene.json" { "scenes/room/ground_truth/scene.json" } else { &name };
+        let is_list = ["MANIFEST.sha256", "dataset.json"].contains(&place) || place.starts_with(".build");
+        assert!(is_list || std::fs::read(whole.join(place)).unwrap() == bytes, "{name}");
+    }
+    // The public tree is enough to make submissions, and the whole one to score them.
     let out = tempfile::tempdir().unwrap();
-    publish(dataset(), out.path()).ends_with(0);
-    publish(dataset(), out.path()).ends_with(2).says("--force");
+    let [grey, result] = ["grey", "grey.json"].map(|name| out.path().join(name));
+    run(&mut baseline("grey", &public, &grey)).ends_with(0);
+    run(&mut score(&grey, &public, &result)).ends_with(2).says("this needs the whole dataset");
+    run(&mut score(&grey, &whole, &result)).ends_with(0);
+    assert_eq!(json(&result)["findings"], serde_json::json!([]));
+}
+
+#[test]
+fn the_commitment_holds_for_this_truth_alone() {
+    let copy = tempfile::tempdir().unwrap();
+    copy_folder(&SPLIT.join("whole"), copy.path());
+    let secret = SPLIT.join("private/commitment.secret");
+    let opened = |root: &Path| run(mateval().args(["prep", "verify", "--opened"]).arg(&secret).arg(root));
+    assert!(manifest(copy.path()).contains(&std::fs::read_to_string(SPLIT.join("commitment")).unwrap()));
+    opened(copy.path()).ends_with(0);
+    // Another truth, with a list that fits it.
+    let file = "scenes/room/ground_truth/lights.json";
+    let [truth, list] = [file, "withheld.sha256"].map(|name| copy.path().join(name));
+    let changed = std::fs::read_to_string(&truth).unwrap() + " ";
+    let hash = |text: &str| sha256_of_bytes(text.as_bytes());
+    let old = hash(&std::fs::read_to_string(&truth).unwrap());
+    std::fs::write(&truth, &changed).unwrap();
+    opened(copy.path()).ends_with(1).prints("changed_file");
+    std::fs::write(&list, std::fs::read_to_string(&list).unwrap().replace(&old, &hash(&changed))).unwrap();
+    opened(copy.path()).ends_with(1).prints("broken_commitment");
+    // Without the secret nobody can tell.
+    std::fs::remove_file(copy.path().join("commitment.secret")).unwrap();
+    run(mateval().args(["prep", "verify"]).arg(copy.path())).ends_with(0);
+    // A split is not changed.
+    run(mateval().args(["prep", "finish"]).arg(copy.path())).ends_with(2);
+}
+
+/// Fault 1 of the design: the recipe, the source's files and the same program made every withheld map again.
+#[test]
+fn nothing_withheld_can_be_made_again_without_the_key() {
+    let public = SPLIT.join("public");
+    assert!(!public.join("recipe.toml").exists());
+    let scene = json(&public.join("scenes/room/scene.json"));
+    assert_eq!((&scene["source"]["files"], &scene["findings"]), (&serde_json::json!([]), &serde_json::json!([])));
+    let weak: BTreeSet<&str> =
+        scene["redressed"]["weak"].as_array().unwrap().iter().map(|one| one["instance"].as_str().unwrap()).collect();
+    let map = |root: &Path, instance: &str| {
+        std::fs::read(root.join(format!("scenes/room/ground_truth/materials/{instance}/base_color.png"))).ok()
+    };
+    let mut compared = 0;
+    for instance in scene["instances"].as_array().unwrap().iter().map(|one| one["id"].as_str().unwrap()) {
+        let Some(withheld) = map(&SPLIT.join("private"), instance) else { continue };
+        if !weak.contains(instance) {
+            compared += 1;
+            assert!(map(unrendered(), instance).unwrap() != withheld, "{instance} was made again");
+        }
+    }
+    assert!(compared >= 4, "{compared}");
+}
+
+/// Fault 2: hashes of withheld maps occur in public datasets. And nothing else of a withheld file is public: not its
+/// size, nor a piece of its content.
+#[test]
+fn the_public_tree_holds_no_hash_size_or_piece_of_a_withheld_file() {
+    let public = contents(&SPLIT.join("public"));
+    let unrelated = contents(unrendered());
+    let texts: Vec<u8> = public
+        .iter()
+        .filter(|(file, _)| file.extension().is_none_or(|ending| ending == "json" || ending == "sha256"))
+        .flat_map(|(_, bytes)| bytes.clone())
+        .collect();
+    let mut pieces = 0;
+    for (file, bytes) in contents(&SPLIT.join("private")) {
+        assert!(!public.iter().any(|(_, other)| *other == bytes), "{file:?} is public");
+        assert!(!holds(&texts, sha256_of_bytes(&bytes).as_bytes()), "the hash of {file:?} is public");
+        let is_map = file.ends_with("base_color.png");
+        assert!(!is_map || !holds(&texts, format!(": {}", bytes.len()).as_bytes()), "the size of {file:?} is public");
+        // From the middle of each map, past what all PNG files begin with.
+        let piece = &bytes[bytes.len() / 2..][..16.min(bytes.len() / 2)];
+        if is_map && piece.len() == 16 && !unrelated.iter().any(|(_, other)| holds(other, piece)) {
+            pieces += 1;
+            assert!(!public.iter().any(|(_, other)| holds(other, piece)), "a piece of {file:?} is public");
+        }
+    }
+    assert!(pieces >= 4, "{pieces}");
+}
+
+/// Fault 3: the results of black and of three colours solve for the mean colour of every instance. Rounded ones give
+/// the mean of everything, which is what `median` finds in the photo.
+#[test]
+fn rounded_results_are_no_oracle() {
+    let out = tempfile::tempdir().unwrap();
+    let [public, whole] = ["public", "whole"].map(|name| SPLIT.join(name));
+    let submission = out.path().join("constant");
+    run(&mut baseline("grey", &public, &submission)).ends_with(0);
+    let maps: Vec<PathBuf> =
+        files_below(&submission).into_iter().filter(|file| file.ends_with("base_color.png")).collect();
+    let result = out.path().join("result.json");
+    let rounded = out.path().join("rounded.json");
+    let shown = |submission: &Path| {
+        run(score(submission, &whole, &result).arg("--force").arg("--rounded").arg(&rounded)).ends_with(0);
+        let file = json(&rounded);
+        assert!(!file.to_string().contains("instance") && file["headline"].as_object().unwrap().len() == 1, "{file}");
+        file["headline"]["mateval-3"]["albedo.novel.psnr"].as_f64().unwrap()
+    };
+    let psnr_of = |color: [f32; 3]| {
+        let bytes = color.map(|value| (255.0 * srgb_from_linear(value)).round() as u8);
+        for map in &maps {
+            png_io::write_rgb_bytes(&submission.join(map), &Picture::filled(8, 8, bytes)).unwrap();
+        }
+        shown(&submission)
+    };
+    let mse = |psnr: f64| 10_f64.powf(-psnr / 10.0);
+    let black = mse(psnr_of([0.0; 3]));
+    let mut best = [0.0; 3];
+    for channel in 0..3 {
+        let mut color = [0.0; 3];
+        color[channel] = 1.0;
+        // The mean of (t - 1)^2 over a channel and t^2 over the others is that of black plus (1 - 2 mean) / 3.
+        let found = (1.0 - 3.0 * (mse(psnr_of(color)) - black)) / 2.0;
+        best[channel] = found.clamp(0.0, 1.0) as f32;
+    }
+    let oracle = psnr_of(best);
+    let median = out.path().join("median");
+    run(baseline("median", &public, &median).args(["--estimate", "input"])).ends_with(0);
+    let honest = shown(&median);
+    assert!(oracle <= honest + 1.5, "the oracle reaches {oracle} dB, the median {honest} dB");
+    // A board is made from whole results.
+    let board = run(mateval().args(["eval", "leaderboard"]).arg(&rounded).arg("--out").arg(out.path().join("site")));
+    board.ends_with(2).says("mateval-rounded/1");
+}
+
+/// Fault 4: the next step of the guide packed the whole dataset without a word.
+#[test]
+fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
+    let out = tempfile::tempdir().unwrap();
+    for (at, format) in ["tar", "croissant", "huggingface", "nerfstudio", "colmap"].into_iter().enumerate() {
+        let export = |dataset: &str| {
+            let place = out.path().join(format!("{dataset}-{at}"));
+            let mut command = mateval();
+            command.args(["prep", "export", "--as", format, "--out"]).arg(&place).arg(SPLIT.join(dataset));
+            (command, place)
+        };
+        // The whole split, and the redressed dataset before it was split.
+        for dataset in ["whole", "dataset"] {
+            let (mut command, place) = export(dataset);
+            run(&mut command).ends_with(2).says("--with-ground-truth");
+            assert!(!place.exists(), "{place:?}");
+        }
+        let (mut command, place) = export("public");
+        run(&mut command).ends_with(0);
+        for (file, bytes) in contents(&place) {
+            assert!(!holds(&bytes, b"ground_truth/materials/"), "{file:?}");
+        }
+    }
+    let report = out.path().join("report");
+    let words = |dataset: &str| {
+        let mut command = mateval();
+        command.args(["prep", "publish"]).arg(SPLIT.join(dataset)).arg("--report").arg(&report);
+        command
+    };
+    run(&mut words("whole")).ends_with(2).says("--with-ground-truth");
+    run(&mut words("public")).ends_with(0);
+    let text = std::fs::read_to_string(report.join("release.json")).unwrap();
+    assert!(text.contains("\"secrecy\": \"secret\"") && text.contains("\"remake\": null"), "{text}");
+}
+
+#[test]
+fn what_follows_from_public_files_is_not_called_secret() {
+    let out = tempfile::tempdir().unwrap();
+    publish(dataset(), out.path(), &[]).ends_with(2).says("redress").says("--open-book");
+    assert!(!out.path().join("public").exists());
+    publish(dataset(), out.path(), &["--open-book"]).ends_with(0).prints("truth withheld, not secret");
+    assert_eq!(json(&out.path().join("public/dataset.json"))["withheld"], "not_secret");
+    // Nothing is overwritten, and a public tree has nothing to withhold.
+    publish(dataset(), out.path(), &["--open-book"]).ends_with(2).says("--force");
+    publish(&out.path().join("public"), &out.path().join("again"), &["--open-book"]).ends_with(2);
     let one = out.path().join("one");
-    let words = ["prep", "publish", "--withhold", "ground_truth", "--public"].map(Path::new);
+    let words = ["prep", "publish", "--open-book", "--withhold", "ground_truth", "--public"].map(Path::new);
     run_words(words.into_iter().chain([one.as_path(), Path::new("--private"), one.as_path(), dataset()]))
         .ends_with(2)
         .says("not be withheld");
-    // A public tree has no ground truth to withhold.
-    publish(&out.path().join("public"), &out.path().join("again")).ends_with(2);
+}
+
+#[test]
+fn a_changed_dataset_is_not_published() {
+    let (out, changed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    copy_folder(unrendered(), changed.path());
+    let truth = changed.path().join("scenes/room/ground_truth/lights.json");
+    std::fs::write(&truth, std::fs::read_to_string(&truth).unwrap() + " ").unwrap();
+    publish(changed.path(), out.path(), &["--open-book"]).ends_with(2).says("changed_file");
+    assert!(files_below(out.path()).is_empty());
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::command::{Run, mateval, run};
 use super::sample::json;
-use super::scores::result;
+use super::scores::{result, scored};
 
 /// The words of the workflow's `mateval` command.
 fn words() -> Vec<String> {
@@ -18,16 +18,44 @@ fn run_workflow(folder: &Path) -> Run {
     run(mateval().args(words()).current_dir(folder))
 }
 
+fn make_keys(folder: &Path) {
+    run(mateval().args(["key", "new", "keeper.key"]).current_dir(folder)).ends_with(0);
+}
+
+/// Verifies a result of the folder and signs that.
+fn verify(folder: &Path, name: &str, submission: &str) {
+    let file = ["json", "JSON"].map(|ending| folder.join("results").join(name).with_extension(ending));
+    let mut command = mateval();
+    command.args(["eval", "verify", "--sign", "keeper.key", "--submission"]).arg(scored(submission));
+    command.arg("--dataset").arg(scored("dataset")).arg(file.iter().find(|file| file.exists()).unwrap());
+    command.arg("--out").arg(file[0].with_extension("verified.json")).current_dir(folder);
+    run(&mut command).ends_with(0);
+}
+
 #[test]
 fn the_workflow_builds_the_board_and_refuses_a_changed_result() {
     let folder = tempfile::tempdir().unwrap();
+    make_keys(folder.path());
     let results = folder.path().join("results");
     std::fs::create_dir_all(results.join("grey")).unwrap();
     std::fs::copy(result("gt"), results.join("ceiling.json")).unwrap();
     std::fs::copy(result("grey"), results.join("grey/RESULT.json")).unwrap();
+    // A ceiling that anybody may have written is none.
+    run_workflow(folder.path()).ends_with(2).says("unverified_ceiling");
+    verify(folder.path(), "ceiling", "gt");
     run_workflow(folder.path()).ends_with(0);
     let board = json(&folder.path().join("site/downloads/leaderboard.json"));
     assert_eq!(board["methods"].as_array().unwrap().len(), 1);
+    assert_eq!(board["methods"][0]["verified"], "claimed");
+    std::fs::rename(results.join("grey/RESULT.json"), results.join("grey.JSON")).unwrap();
+    verify(folder.path(), "grey", "grey");
+    // What systems leave behind is named, and no obstacle.
+    std::fs::create_dir(results.join(".ipynb_checkpoints")).unwrap();
+    std::fs::write(results.join("._grey.json"), "x").unwrap();
+    std::fs::remove_dir_all(folder.path().join("site")).unwrap();
+    run_workflow(folder.path()).ends_with(0).says("skipped 'results/._grey.json'");
+    let board = json(&folder.path().join("site/downloads/leaderboard.json"));
+    assert_eq!(board["methods"][0]["verified"], "confirmed");
     assert_eq!(board["ceiling"]["method"], "gt");
 
     std::fs::remove_dir_all(folder.path().join("site")).unwrap();
@@ -54,6 +82,7 @@ fn changed(place: &Path, method: &str, sha256: &str) {
 #[test]
 fn results_that_cannot_share_a_board_are_refused() {
     let folder = tempfile::tempdir().unwrap();
+    make_keys(folder.path());
     let results = folder.path().join("results");
     std::fs::create_dir(&results).unwrap();
     for (name, method, sha256) in
@@ -85,6 +114,7 @@ fn results_that_cannot_share_a_board_are_refused() {
 #[test]
 fn the_refusal_to_replace_a_foreign_folder_says_once_what_failed() {
     let folder = tempfile::tempdir().unwrap();
+    make_keys(folder.path());
     std::fs::create_dir_all(folder.path().join("results")).unwrap();
     std::fs::copy(result("grey"), folder.path().join("results/grey.json")).unwrap();
     std::fs::create_dir(folder.path().join("site")).unwrap();

@@ -28,6 +28,11 @@ static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
     folder
 });
 
+/// The dataset, or the submission `grey` or `gt`.
+pub fn scored(name: &str) -> PathBuf {
+    SCORED.join(name)
+}
+
 /// The result of `grey` or `gt`.
 pub fn result(method: &str) -> PathBuf {
     SCORED.join(method).with_extension("json")

@@ -16,6 +16,7 @@ use mateval_metrics::{Lpips, Net};
 use mateval_report::leaderboard::marks;
 use mateval_report::pair::{PairValues, compare};
 use mateval_report::release::file::Day;
+use mateval_report::rounded::RoundedFile;
 use mateval_submission::SubmissionError;
 use mateval_submission::archive::Opened;
 use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
@@ -135,6 +136,10 @@ pub struct ScoreArgs {
     /// that were scored apart.
     #[arg(long, requires = "cache")]
     only_cached: bool,
+    /// File for the numbers of a hidden split that may be shown: the headline, rounded, with no scene, instance or
+    /// picture; for a single submission.
+    #[arg(long, value_name = "FILE")]
+    rounded: Option<PathBuf>,
     /// Folder for the pictures from which the numbers are computed, as float EXR, for whoever computes them again with
     /// other tools; with several submissions a folder of it for each, 0 first.
     #[arg(long, value_name = "FOLDER", conflicts_with = "only_cached")]
@@ -155,6 +160,12 @@ impl ScoreArgs {
             path.iter().try_for_each(|path| check_outside_datasets(path, place))?;
         }
         check_results(&outs, self)?;
+        if let Some(rounded) = &self.rounded {
+            check_output_file(rounded, "--rounded", "result", self.force)?;
+            if self.submissions.len() > 1 {
+                bail!("--rounded takes the numbers of one submission; {} are given", self.submissions.len());
+            }
+        }
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         let cache = self.cache.clone().unwrap_or_else(|| cache_beside(&self.out));
@@ -177,6 +188,7 @@ impl ScoreArgs {
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
         for (result, out) in results.iter().zip(&outs) {
             json::write_lines(out, result)?;
+            self.rounded.iter().try_for_each(|rounded| json::write(rounded, &RoundedFile::new(result)))?;
             say_findings(&result.method, &result.findings, &out.display().to_string());
             print(&format!("{}\n", out.display()))?;
         }

@@ -7,7 +7,9 @@ mod publish;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
+use mateval_dataset::manifest::check_opened;
 use mateval_dataset::open::check_outside_datasets;
+use mateval_dataset::withheld::Secret;
 use mateval_dataset::{SceneId, Severity, json};
 use mateval_files::whole::write_whole;
 use mateval_prep::compare::{CompareOptions, compare, tables};
@@ -68,6 +70,10 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
 pub struct VerifyArgs {
     /// Folder of the dataset.
     dataset: PathBuf,
+    /// The secret of a hidden split, which its keeper publishes together with the ground truth: checks that the truth is
+    /// the one that was committed to.
+    #[arg(long, value_name = "SECRET")]
+    opened: Option<PathBuf>,
     /// How to print the findings.
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
@@ -76,8 +82,11 @@ pub struct VerifyArgs {
 impl VerifyArgs {
     /// Checks the dataset and prints all findings.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let findings = with_progress(|progress| verify(&self.dataset, progress))
+        let mut findings = with_progress(|progress| verify(&self.dataset, progress))
             .with_context(|| format!("cannot verify '{}'", self.dataset.display()))?;
+        if let Some(secret) = &self.opened {
+            findings.extend(check_opened(&self.dataset, &Secret::read(secret)?)?);
+        }
         let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
         match self.format {
             Format::Json => print(&json::to_text(&serde_json::json!({

@@ -45,6 +45,13 @@ pub enum DatasetError {
         /// The first of them, relative to the dataset.
         first: String,
     },
+    /// The ground truth of a hidden split would be passed on.
+    #[error(
+        "'{}' holds the ground truth of a hidden split, which would be passed on: give the public part of `mateval prep \
+         publish --withhold`, or add --with-ground-truth",
+        path.display()
+    )]
+    SecretTruth { path: PathBuf },
     /// A file of another version than the one that is read here.
     #[error(
         "'{}' has the format '{found}', and this version of MatEval reads '{expected}': {}",

@@ -20,6 +20,7 @@ pub mod conversion;
 pub mod error;
 pub mod perturb;
 pub mod recipe;
+mod redress;
 pub mod render;
 pub mod scene_meshes;
 pub mod stats;

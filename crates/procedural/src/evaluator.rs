@@ -200,7 +200,7 @@ fn dependencies(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usiz
 }
 
 /// The outputs at places `[u, v, footprint]`, all in metres.
-pub(crate) fn evaluate(program: &Program, settings: &Settings, places: &[[f64; 3]]) -> Vec<[f64; OUTPUTS]> {
+pub fn evaluate(program: &Program, settings: &Settings, places: &[[f64; 3]]) -> Vec<[f64; OUTPUTS]> {
     let mut evaluator = Evaluator::new(program, settings, &[]);
     let mut all = Vec::with_capacity(places.len());
     for batch in places.chunks(LANES) {

@@ -8,7 +8,7 @@
 //! points at once. [`node`] lists the supported nodes with the defaults of their inputs, [`noise`] has the noises, and
 //! [`Settings`] hold the values of a graph's parameters.
 //!
-//! [`fit`] finds the graph and the settings that show what is seen of a part.
+//! [`fit`] finds the graph and the settings that show what is seen of a part; [`unfolding`] lays parts out flat.
 //!
 //! A graph has the outputs `base_color` (linear), `roughness` and `metallic`. Its texture coordinates are metres. An
 //! input called `footprint` is set at every point to the extent of its pixel or texel, so that edges and lines are as
@@ -23,6 +23,7 @@ pub mod mtlx;
 pub mod node;
 pub mod noise;
 pub mod program;
+pub mod unfolding;
 pub mod value;
 
 pub use error::ProceduralError;

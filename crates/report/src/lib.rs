@@ -15,6 +15,7 @@ pub mod pair;
 pub mod publish;
 pub mod ranking;
 pub mod release;
+pub mod rounded;
 pub mod strips;
 pub mod tables;
 

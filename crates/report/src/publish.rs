@@ -66,7 +66,8 @@ pub fn publish(
         return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
     let is_withheld = |entry: &Entry| is_ground_truth(&entry.file) || entry.file == RECIPE;
-    let (mut withheld, mut shown): (Vec<Entry>, Vec<Entry>) = manifest::entries(root)?.into_iter().partition(is_withheld);
+    let (mut withheld, mut shown): (Vec<Entry>, Vec<Entry>) =
+        manifest::entries(root)?.into_iter().partition(is_withheld);
     if !withheld.iter().any(|entry| is_ground_truth(&entry.file)) {
         return Err(ReportError::NoGroundTruth { path: root.to_owned() });
     }

@@ -21,13 +21,13 @@ use mateval_procedural::fit::paper::fit_as_paper;
 use mateval_procedural::fit::{Point, split};
 use mateval_procedural::graph::slots;
 use mateval_procedural::library::Class;
+use mateval_procedural::unfolding::{Chart, PartFrame};
 use mateval_procedural::value::Type;
 use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 use serde::Serialize;
 
-use super::part_frame::{Chart, PartFrame};
 use super::part_samples::{PartSamples, Sample};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};

@@ -3,15 +3,14 @@
 //! In: the public geometry of a scene and an estimate of its input view. Out: a submission, and a report beside it with
 //! the graphs as MaterialX.
 //!
-//! Each part's surface is laid out flat in metres, as the unfolded sides of a box (`part_frame`). The pixels that
-//! show its most visible side become points of that layout (`part_samples`), to which the graphs of
+//! Each part's surface is laid out flat in metres, as the unfolded sides of a box ([`mateval_procedural::unfolding`]).
+//! The pixels that show its most visible side become points of that layout (`part_samples`), to which the graphs of
 //! [`mateval_procedural`] are fitted (`materials`). Where a graph predicts held-out pixels better than a single colour
 //! does, it is baked to the atlas (`bake`); all other parts have the median of their pixels. `report` writes what was
 //! found for each part.
 
 mod bake;
 mod materials;
-mod part_frame;
 mod part_samples;
 mod report;
 

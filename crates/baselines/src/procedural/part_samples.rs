@@ -6,8 +6,8 @@ use glam::DVec3;
 use mateval_dataset::{Camera, PartSetId};
 use mateval_procedural::fit::Point;
 use mateval_procedural::noise::cell;
+use mateval_procedural::unfolding::{Chart, PartFrame, Triangle};
 
-use super::part_frame::{Chart, PartFrame, Triangle};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
 use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels, SeenPoint};

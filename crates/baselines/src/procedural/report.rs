@@ -15,10 +15,10 @@ use mateval_procedural::Graph;
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::library::{Class, LIBRARY};
 use mateval_procedural::mtlx::to_text_of_all;
+use mateval_procedural::unfolding::Chart;
 use serde::Serialize;
 
 use super::materials::{PartMaterial, Reason, SceneMaterials};
-use super::part_frame::Chart;
 use super::part_samples::PartSamples;
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Placement};

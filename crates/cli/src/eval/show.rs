@@ -282,6 +282,9 @@ pub struct LeaderboardArgs {
     /// truth's pictures.
     #[arg(long)]
     pictures: Option<PathBuf>,
+    /// Show pictures of a hidden split, whose ground truth everybody can then see.
+    #[arg(long, requires = "dataset")]
+    with_ground_truth: bool,
     /// JSON file of errors that were found after publication.
     #[arg(long)]
     errata: Option<PathBuf>,
@@ -319,6 +322,7 @@ impl LeaderboardArgs {
             say(&format!("warning: '{}' {why}", sidecar.display()));
         }
         let dataset = self.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
+        dataset.iter().try_for_each(|dataset| dataset.check_may_be_shown(self.with_ground_truth))?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         if let Some(pictures) = self.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
             bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());

@@ -35,6 +35,9 @@ pub struct PublishArgs {
     /// say "truth withheld, not secret".
     #[arg(long, requires = "withhold")]
     open_book: bool,
+    /// For a report without --withhold: describe a hidden split with its ground truth, which is refused otherwise.
+    #[arg(long, requires = "report", conflicts_with = "withhold")]
+    with_ground_truth: bool,
     #[command(flatten)]
     report: ReportArgs,
     /// Replace folders that already exist.
@@ -89,10 +92,14 @@ impl PublishArgs {
         if let Some(options) = &options {
             check_report(options, &halves)?;
         }
+        if halves.is_none() {
+            Dataset::open(&self.dataset)?.check_may_be_shown(self.with_ground_truth)?;
+        }
         let release = options.as_ref().map(CheckedRelease::new).transpose().context("cannot report on the release")?;
         let published = halves.map(|[public, private]| split(self, public, private)).transpose()?;
         let Some(release) = release else { return Ok(Outcome::Good) };
-        let file = with_progress(|progress| release.write(TOOL, published.as_ref(), progress)).context("cannot report on the release")?;
+        let file = with_progress(|progress| release.write(TOOL, published.as_ref(), progress))
+            .context("cannot report on the release")?;
         print(&summary(self, &file))?;
         Ok(if file.is_good() { Outcome::Good } else { Outcome::No })
     }
@@ -205,6 +212,9 @@ pub struct ExportArgs {
     /// For mitsuba: samples per pixel [default: the recipe's].
     #[arg(long, requires = "scene", value_parser = samples_parser())]
     samples: Option<u32>,
+    /// Pass on the ground truth of a hidden split, too, which is refused otherwise.
+    #[arg(long)]
+    with_ground_truth: bool,
     /// For mitsuba: replace a folder that already exists.
     #[arg(long, requires = "scene")]
     force: bool,
@@ -239,6 +249,7 @@ impl ExportArgs {
             (FormatName::Nerfstudio, None) => Format::Nerfstudio,
             (FormatName::Colmap, None) => Format::Colmap,
         };
+        Dataset::open(&self.dataset)?.check_may_be_shown(self.with_ground_truth)?;
         let options = ExportOptions {
             dataset: self.dataset.clone(),
             format,
@@ -282,6 +293,7 @@ impl ExportArgs {
         check_free(&self.out, self.force, "folder")?;
         check_outside_datasets(&self.out, "--out")?;
         let dataset = Dataset::open(&self.dataset)?;
+        dataset.check_may_be_shown(self.with_ground_truth)?;
         let samples = match self.samples {
             Some(samples) => samples,
             None => recipe::read(&self.dataset.join(RECIPE))?.0.samples,

@@ -155,6 +155,10 @@ pub struct SceneFile {
     /// picture is not known, so the scene has no renders and its light is not scored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo: Option<Photo>,
+    /// What is public of the truth, where materials were replaced by others that were drawn with a secret key; absent
+    /// where the truth has the source's materials.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redressed: Option<Redressed>,
     /// The input view first, then the novel ones.
     pub views: Vec<View>,
     /// In the order of their index.
@@ -188,6 +192,42 @@ pub struct SceneSource {
 
 fn is_zero(shift_m: &[f64; 3]) -> bool {
     *shift_m == [0.0; 3]
+}
+
+/// What is public of the truth of a scene whose materials were replaced by others, drawn with a secret key.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Redressed {
+    /// The share of the area of all surfaces with a base colour that `weak` lists, 0 to 1.
+    pub weak_area_share: f64,
+    /// The surfaces whose truth follows, at least in part, from public files; in the order of the instances.
+    pub weak: Vec<WeakSecret>,
+}
+
+/// An instance whose truth follows, at least in part, from public files.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WeakSecret {
+    /// The instance's id.
+    pub instance: InstanceId,
+    /// Why its material could not be replaced.
+    pub reason: WeakReason,
+    /// Its share of the area of all surfaces with a base colour, 0 to 1.
+    pub area_share: f64,
+}
+
+/// Why a material could not be replaced by another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WeakReason {
+    /// Its picture is its point, as that of a painting, a book, a plant or a rug with a motif: it has other colours.
+    Motif,
+    /// Its picture also cuts out its shape: it has other colours.
+    CutOut,
+    /// Opaque glass: it has the source's mean colour.
+    Glass,
+    /// A mirror: it has the source's material.
+    Kept,
 }
 
 /// An input picture that came from elsewhere.

@@ -229,7 +229,8 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
     }
     for file in manifest.withheld.into_iter().filter(|file| concerns(file)) {
         if root.join(&file).exists() {
-            let message = format!("its hash is withheld, and '{WITHHELD}' is missing, which lies with the withheld files");
+            let message =
+                format!("its hash is withheld, and '{WITHHELD}' is missing, which lies with the withheld files");
             findings.push(fault("unlisted_file", &file, String::new(), &message));
             listed.insert(file);
         } else {

@@ -1,7 +1,7 @@
 //! Makes the dataset of a recipe scene by scene, each completely or not at all. A run that was killed is resumed.
 //!
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
-//! reads the source and chooses the input camera; `plan` numbers instances and parts ([`parts`], [`labels`]), reads the
+//! reads the source and chooses the input camera, and [`redress`] gives it other materials if the recipe says so; `plan` numbers instances and parts ([`parts`], [`labels`]), reads the
 //! `photo` if the scene has one, converts the materials and places the views (`wide_views`); `pictures` writes what each
 //! view shows, and `refusals` refuses scenes that would become a wrong truth; [`materials`] unwraps every instance and
 //! bakes its material ([`baking`]); meshes and `scene.json` are written here. [`finish`] writes the files of the whole
@@ -32,14 +32,16 @@ use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::reference::Surface;
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
-use mateval_dataset::{DatasetError, Finding, Progress, Report, SceneId, TriangleMesh, json, reference};
+use mateval_dataset::{DatasetError, Finding, InstanceId, Progress, Report, SceneId, TriangleMesh, json, reference};
 use mateval_files::FileError;
 use mateval_files::work_folder::{WorkFolder, remove, remove_beside};
 use mateval_sources::source_scene::LicenceText;
 
 use crate::atlas::cache::AtlasCache;
 use crate::error::PrepError;
+use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{self, Recipe, RecipeScene};
+use crate::redress::{Secret, redress};
 use crate::render::BlenderOptions;
 use fault::{BuildFault, PinFault, above_notes};
 use finish::finish_build;
@@ -50,7 +52,8 @@ use refusals::{check_missing, check_unstated, is_lit};
 use source::{Baking, read_source};
 pub use start::BuildOptions;
 use start::{
-    SceneMark, begin, check_sources, finished_scene, label_files, make_relative, settings_sha256, source_folder,
+    SceneMark, begin, check_sources, finished_scene, label_files, make_relative, secret_of, settings_sha256,
+    source_folder,
 };
 
 #[derive(Clone, Debug, Default)]
@@ -128,10 +131,13 @@ fn make_scene(
     let labels = label_files(entry, source);
     let cache = options.atlas_cache.as_deref().map(AtlasCache::new);
     let at = SceneFolder::at(work.path().to_owned());
-    let (licence, absent) =
-        build_scene(recipe, entry, source, options.blender.as_ref(), &at, cache.as_ref(), progress)?;
+    let secret = secret_of(entry, source, &options.out).map_err(RecipeSceneFault::from);
+    let secret = secret.map_err(PrepError::scene(&entry.id))?;
+    let making = Making { recipe, entry, source, blender: options.blender.as_ref(), secret: secret.as_ref() };
+    let (licence, absent) = build_scene(&making, &at, cache.as_ref(), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
-    let made = SceneMark { settings_sha256, licence, absent, labels };
+    let secret = secret.as_ref().map(Secret::fingerprint);
+    let made = SceneMark { settings_sha256, licence, secret, absent, labels };
     work.finish()?;
     remove(&build.left_out(&entry.id))?;
     SceneHashes::empty(&options.out, &entry.id).update()?;
@@ -141,26 +147,43 @@ fn make_scene(
     Ok(json::write(&mark, &made)?)
 }
 
-/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases
-/// are taken from the cache where it holds them. Returns what the folder does not hold: the licence that came with the
-/// source, and the files that were looked for but do not exist, with paths as in `scene.json`; sorted.
+/// What a scene is made of.
+struct Making<'a> {
+    recipe: &'a Recipe,
+    entry: &'a RecipeScene,
+    /// The folder that the recipe's paths are relative to.
+    source: &'a Path,
+    /// Reads the source if it is a Blender file.
+    blender: Option<&'a BlenderOptions>,
+    /// Redresses the scene.
+    secret: Option<&'a Secret>,
+}
+
+/// Makes the scene in `folder`. Atlases are taken from the cache where it holds them. Returns what the folder does not
+/// hold: the licence that came with the source, and the files that were looked for but do not exist, with paths as in
+/// `scene.json`; sorted.
 fn build_scene(
-    recipe: &Recipe,
-    entry: &RecipeScene,
-    source: &Path,
-    blender: Option<&BlenderOptions>,
+    making: &Making<'_>,
     folder: &SceneFolder,
     cache: Option<&AtlasCache>,
     progress: Progress<'_>,
 ) -> Result<(Option<LicenceText>, Vec<String>), PrepError> {
+    let Making { recipe, entry, source, blender, secret } = *making;
     // The source, with numbered instances and parts.
     progress(Report::step("read the source", 0, 1));
-    let read = read_source(recipe, entry, source, &Baking { blender, folder: folder.path(), progress })?;
+    let mut read = read_source(recipe, entry, source, &Baking { blender, folder: folder.path(), progress })?;
     let licence = read.read.licence.clone();
     let missing = check_missing(entry, &read.read.missing, &entry.root(source), &read.file, &read.read.findings);
     let missing = missing.map_err(PrepError::scene(&entry.id))?;
+    progress(Report::step("redress", 0, 1));
+    let weak = secret.map(|secret| redress(&mut read, &entry.id, secret)).transpose()?;
     let (mut plan, absent) = make_plan(recipe, entry, source, read)?;
     plan.findings.extend(missing);
+    if let Some(weak) = weak {
+        let ids: Vec<InstanceId> = plan.instances.iter().map(|instance| instance.id.clone()).collect();
+        plan.findings.extend(weak.findings(&plan.file, &ids));
+        plan.redressed = Some(weak.listed(&ids));
+    }
     check_inputs(entry, &plan.source.files)?;
     make_folders(folder, &plan)?;
 
@@ -301,6 +324,7 @@ fn write_scene_file(
         materials: recipe.materials,
         exposure: entry.exposure,
         photo: plan.photo.map(|photo| photo.listed),
+        redressed: plan.redressed,
         views: plan.views,
         instances,
         parts,

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_dataset::dataset::{SceneSource, SourceFile, TrueMaterials, View};
+use mateval_dataset::dataset::{Redressed, SceneSource, SourceFile, TrueMaterials, View};
 use mateval_dataset::material::{ClassifiedPart, MaterialClass};
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::reference::SourceMaterials;
@@ -41,6 +41,8 @@ pub(super) struct Plan {
     pub(super) views: Vec<View>,
     /// The input picture, where it is not rendered.
     pub(super) photo: Option<ScenePhoto>,
+    /// What is public of a redressed scene.
+    pub(super) redressed: Option<Redressed>,
     pub(super) findings: Vec<Finding>,
     /// The file that findings refer to by default.
     pub(super) file: String,
@@ -113,6 +115,7 @@ pub(super) fn make_plan(
         classes,
         views,
         photo,
+        redressed: None,
         findings,
         file,
     };

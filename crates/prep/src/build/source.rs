@@ -230,7 +230,7 @@ fn front3d_scene(
     root: &Path,
     room: &Front3dRoom,
 ) -> Result<SourceScene, PrepError> {
-    let house = front3d::furnish(&house_files(root, room), &front3d::Limits::default())?;
+    let house = front3d::furnish(&house_files(root, room, entry.redress.is_some()), &front3d::Limits::default())?;
     let Some(number) = house.house.room(&room.room) else {
         let rooms: Vec<&str> = house.house.rooms.iter().map(|room| room.id.as_str()).collect();
         let (wanted, known) = (format!("room '{}'", room.room), quoted(&rooms));
@@ -244,7 +244,7 @@ fn front3d_scene(
 }
 
 /// The paths of the files of a recipe's room.
-fn house_files(root: &Path, room: &Front3dRoom) -> HouseFiles {
+fn house_files(root: &Path, room: &Front3dRoom, is_redressed: bool) -> HouseFiles {
     HouseFiles {
         root: root.to_owned(),
         house: room.house.clone(),
@@ -252,7 +252,7 @@ fn house_files(root: &Path, room: &Front3dRoom) -> HouseFiles {
         textures: room.textures.clone(),
         cameras: room.cameras.clone(),
         blenderproc_compat: room.blenderproc_compat,
-        appearance: room.appearance_rule(),
+        appearance: room.appearance_rule(is_redressed),
     }
 }
 

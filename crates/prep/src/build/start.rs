@@ -19,7 +19,9 @@ use serde::{Deserialize, Serialize};
 use super::labels::file_names;
 use crate::error::PrepError;
 use crate::recipe::fault::{RecipeFault, RecipeSceneFault};
-use crate::recipe::{Recipe, RecipeScene, SourcePath};
+use crate::recipe::{Recipe, RecipeScene, Redress, SourcePath};
+use crate::redress::Secret;
+use crate::redress::secret::SecretFault;
 use crate::render::BlenderOptions;
 
 #[derive(Clone, Debug)]
@@ -73,7 +75,17 @@ fn refuse_if_any(options: &BuildOptions, faults: Vec<(SceneId, RecipeSceneFault)
 /// Fails before the first scene is made if any scene's sources are missing or differ from those that the recipe pins.
 pub(super) fn check_sources(options: &BuildOptions, scenes: &[&RecipeScene], source: &Path) -> Result<(), PrepError> {
     refuse_if_any(options, faults_of_all(scenes, source, missing_sources))?;
+    let secret = |scene: &&RecipeScene| Some((scene.id.clone(), secret_of(scene, source, &options.out).err()?.into()));
+    refuse_if_any(options, scenes.iter().filter_map(secret).collect())?;
     refuse_if_any(options, faults_of_all(scenes, source, changed_inputs))
+}
+
+/// The key and the materials that a scene is redressed with, if it is. Fails where they could be published with the
+/// dataset `out` or with what lies below `source`.
+pub(super) fn secret_of(entry: &RecipeScene, source: &Path, out: &Path) -> Result<Option<Secret>, SecretFault> {
+    let Some(Redress { key, materials }) = &entry.redress else { return Ok(None) };
+    let materials = materials.as_ref().map(|folder| source.join(folder));
+    Secret::open(&source.join(key), materials.as_deref(), &[source, out]).map(Some)
 }
 
 /// The faults that `check` finds in the scenes.
@@ -259,6 +271,9 @@ pub(crate) struct SceneMark {
     /// The hash of the recipe's settings for the scene, and of the tool that made it.
     pub(crate) settings_sha256: String,
     pub(crate) licence: Option<Licence>,
+    /// What the key and the materials were that the scene was redressed with; absent if it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) secret: Option<String>,
     /// Files that were looked for but do not exist, with paths as in `scene.json`.
     pub(super) absent: Vec<String>,
     /// All files in the folders of labels, whether used or not.
@@ -269,6 +284,10 @@ pub(crate) struct SceneMark {
 pub(super) fn finished_scene(root: &Path, entry: &RecipeScene, source: &Path) -> Option<SceneMark> {
     let mark: SceneMark = json::read(&BuildFolder::of(root).mark(&entry.id)).ok()?;
     let scene: SceneFile = json::read(&SceneFolder::of(root, &entry.id).scene_file()).ok()?;
+    let secret = secret_of(entry, source, root).ok()?;
+    if mark.secret != secret.as_ref().map(Secret::fingerprint) {
+        return None;
+    }
     let root = entry.root(source);
     let is_same = |file: &SourceFile| sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
     let is_absent = |file: &String| !root.join(file).exists();

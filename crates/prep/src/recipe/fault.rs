@@ -7,6 +7,8 @@ use mateval_files::FileError;
 use mateval_files::source_folder::BelowError;
 use mateval_files::untrusted::in_words;
 
+use crate::redress::secret::SecretFault;
+
 /// Farthest that a camera may stand from the origin along an axis, in metres. Beyond that, neighbouring `f32` numbers
 /// are centimetres apart.
 pub(super) const FARTHEST_M: f64 = 1e6;
@@ -77,6 +79,11 @@ pub enum RecipeSceneFault {
     CameraRange,
     #[error("inputs: '{file}': expected a path below the scene's folder")]
     InputPath { file: String },
+    #[error("`redress` changes the room, so that `photo` would show another; leave one of them out")]
+    RedressedPhoto,
+    /// The scene cannot be redressed.
+    #[error(transparent)]
+    Secret(#[from] SecretFault),
     /// A path of the source does not lie below the source's folder.
     #[error("{key}: {source}; name the folder that contains all paths of the scene with --source")]
     OutsideSource { key: &'static str, source: BelowError },

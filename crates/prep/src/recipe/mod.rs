@@ -20,7 +20,7 @@ use crate::error::PrepError;
 pub(crate) use fault::RESOLUTION;
 use fault::{RecipeFault, ValueFault, check_sizes};
 pub(crate) use scene::SourcePath;
-pub use scene::{AppearanceWord, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource};
+pub use scene::{AppearanceWord, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource, Redress};
 
 /// The name of the recipe in the dataset.
 pub const RECIPE: &str = "recipe.toml";
@@ -426,7 +426,7 @@ mod tests {
             let room = "front3d = { house = 'h.json', room = 'R-1', models = 'm', ";
             recipe_of(&format!("name = 'x'\n[[scene]]\nid = 'a'\n{room}{words} }}\ncamera = {{ seed = 1 }}"))
         };
-        let rule = |recipe: Recipe| recipe.scenes[0].front3d.as_ref().unwrap().appearance_rule();
+        let rule = |recipe: Recipe| recipe.scenes[0].front3d.as_ref().unwrap().appearance_rule(false);
         assert_eq!(rule(with("textures = 't'").unwrap()), AppearanceRule::Constant);
         assert_eq!(rule(with("appearance = 'stated'").unwrap()), AppearanceRule::Stated { seed: 0 });
         assert_eq!(

@@ -30,6 +30,8 @@ pub struct RecipeScene {
     pub camera: Option<RecipeCamera>,
     /// The input picture, where it is not rendered: a photo that the camera took.
     pub photo: Option<PathBuf>,
+    /// Other materials for the scene's, drawn with a secret key; the source's own if absent.
+    pub redress: Option<Redress>,
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
     pub part_labels: BTreeMap<PartSetId, PathBuf>,
@@ -50,6 +52,16 @@ pub struct RecipeScene {
     /// Multiplies every RGB picture before clipping.
     #[serde(default = "default_exposure")]
     pub exposure: f64,
+}
+
+/// What a scene is redressed with. Both paths must lead out of the folder that the recipe's paths are relative to.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Redress {
+    /// A file of at least 32 random bytes.
+    pub key: PathBuf,
+    /// A folder of tileable materials; if absent, materials are built-in procedural ones.
+    pub materials: Option<PathBuf>,
 }
 
 /// A room of a 3D-FRONT house, and the paths of everything that it needs.
@@ -87,9 +99,10 @@ pub enum AppearanceWord {
 }
 
 impl Front3dRoom {
-    /// The rule for its roughness and metallic.
-    pub(crate) fn appearance_rule(&self) -> AppearanceRule {
+    /// The rule for its roughness and metallic. A room `is_redressed` by the classes of the stated ones.
+    pub(crate) fn appearance_rule(&self, is_redressed: bool) -> AppearanceRule {
         match self.appearance {
+            AppearanceWord::Constant if is_redressed => AppearanceRule::Stated { seed: 0 },
             AppearanceWord::Constant => AppearanceRule::Constant,
             AppearanceWord::Stated => AppearanceRule::Stated { seed: self.appearance_seed.unwrap_or(0) },
         }
@@ -184,6 +197,9 @@ impl RecipeScene {
         {
             let expected = format!("a file below {}, relative to it", self.root_name());
             own.push(ValueFault::new("photo", format!("'{}'", photo.display()), expected).into());
+        }
+        if self.redress.is_some() && self.photo.is_some() {
+            own.push(RecipeSceneFault::RedressedPhoto);
         }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             own.push(ValueFault::new("exposure", self.exposure.to_string(), "a number above 0").into());

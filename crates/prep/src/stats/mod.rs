@@ -372,6 +372,7 @@ mod tests {
             materials: TrueMaterials::Converted,
             exposure: 1.0,
             photo: None,
+            redressed: None,
             views: Vec::new(),
             instances: things.iter().enumerate().map(|(at, thing)| instance(at, thing)).collect(),
             parts: Vec::new(),

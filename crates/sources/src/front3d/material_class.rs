@@ -101,7 +101,7 @@ const TABLE: [ClassRow; 15] = [
 ];
 
 /// The first class of the table with a word that `name` contains.
-pub(super) fn class_named(name: &str) -> Option<MaterialClass> {
+pub fn class_named(name: &str) -> Option<MaterialClass> {
     let name = name.to_lowercase();
     TABLE.iter().find(|(_, words, ..)| words.iter().any(|word| name.contains(word))).map(|(class, ..)| *class)
 }
@@ -109,11 +109,16 @@ pub(super) fn class_named(name: &str) -> Option<MaterialClass> {
 /// Roughness and metallic of the material `id` of a class. The roughness is drawn from the class's range: it is the
 /// same for the same seed, id and class.
 pub(super) fn drawn(class: MaterialClass, id: &str, seed: u64) -> [f32; 2] {
-    let row = TABLE.iter().find(|(of, ..)| *of == class).expect("a test finds a row for every class");
     let hash = sha256_of_bytes(format!("{seed}/{id}/{class}").as_bytes());
     let bits = u32::from_str_radix(&hash[..6], 16).expect("a hash is hexadecimal");
-    let (_, _, [low, high], metallic) = *row;
+    let ([low, high], metallic) = finish_of(class);
     [low + (high - low) * (bits as f32 / (1 << 24) as f32), metallic]
+}
+
+/// Least and most roughness of a class, and its metallic.
+pub fn finish_of(class: MaterialClass) -> ([f32; 2], f32) {
+    let row = TABLE.iter().find(|(of, ..)| *of == class).expect("a test finds a row for every class");
+    (row.2, row.3)
 }
 
 /// Texels of a class's block. Lookups stay in the middle half of the block, so that all four texels of a bilinear

@@ -30,4 +30,4 @@ pub(crate) mod tests;
 pub use document::Limits;
 pub use furnish::{FurnishedHouse, HouseFiles, PlacedModel, PlacedSurface, furnish, read_house};
 pub use house::{DesignerCamera, House, Room};
-pub use material_class::AppearanceRule;
+pub use material_class::{AppearanceRule, class_named, finish_of};

@@ -18,7 +18,7 @@ const CANDIDATES: usize = 64;
 /// The side of the box that a triangle is laid out with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Chart {
+pub enum Chart {
     /// The side with the main normal.
     Front,
     Back,
@@ -34,7 +34,7 @@ pub(super) enum Chart {
 /// the front depend on the directions of the axes alone, so that patterns continue across parts that share a plane and
 /// these directions, as walls do.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PartFrame {
+pub struct PartFrame {
     axes: [DVec3; 3],
     least: DVec3,
     most: DVec3,
@@ -42,12 +42,12 @@ pub(super) struct PartFrame {
 }
 
 /// A triangle's corners in world space, in metres.
-pub(super) type Triangle = [DVec3; 3];
+pub type Triangle = [DVec3; 3];
 
 impl PartFrame {
     /// The frame of these triangles, whose front faces `viewer`. `origin` is where both coordinates of a front are 0.
     /// None where no triangle has an area.
-    pub(super) fn new(triangles: &[Triangle], viewer: DVec3, origin: DVec3) -> Option<Self> {
+    pub fn new(triangles: &[Triangle], viewer: DVec3, origin: DVec3) -> Option<Self> {
         let normal = main_normal(triangles)?;
         let corners = || triangles.iter().flatten().map(|corner| *corner - origin);
         let count = 3.0 * triangles.len() as f64;
@@ -66,7 +66,7 @@ impl PartFrame {
     }
 
     /// The side of the box whose normal is nearest.
-    pub(super) fn chart(&self, normal: DVec3) -> Chart {
+    pub fn chart(&self, normal: DVec3) -> Chart {
         let [u, v, w] = self.axes.map(|axis| axis.dot(normal));
         // A slight preference for earlier ones decides between equals.
         if w.abs() + 1e-6 >= u.abs() && w.abs() + 1e-6 >= v.abs() {
@@ -80,8 +80,13 @@ impl PartFrame {
         }
     }
 
+    /// Width and height of the box's front, in metres.
+    pub fn front_size(&self) -> [f64; 2] {
+        [self.most.x - self.least.x, self.most.y - self.least.y]
+    }
+
     /// Where a place lies on the unfolded box, in metres.
-    pub(super) fn place(&self, chart: Chart, position: DVec3) -> [f64; 2] {
+    pub fn place(&self, chart: Chart, position: DVec3) -> [f64; 2] {
         let [u, v, w] = self.axes.map(|axis| axis.dot(position - self.origin));
         let (least, most) = (self.least, self.most);
         let behind = most.z - w;
