@@ -21,6 +21,7 @@ use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::entries::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
 use mateval_report::release::ReleaseFile;
+use mateval_report::rounded::RoundedFile;
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
 use serde_json::Value;
@@ -39,7 +40,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 /// The JSON Schema of every kind of JSON file, made from the Rust type that reads and writes it.
-fn schemas() -> [(&'static str, Schema); 26] {
+fn schemas() -> [(&'static str, Schema); 27] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -53,6 +54,7 @@ fn schemas() -> [(&'static str, Schema); 26] {
         ("scorer", schema_for!(ScorerFile)),
         ("result", schema_for!(ResultFile)),
         ("explain", schema_for!(ExplainFile)),
+        ("rounded", schema_for!(RoundedFile)),
         ("verification", schema_for!(VerificationFile)),
         ("lint", schema_for!(LintFile)),
         ("leaderboard", schema_for!(LeaderboardFile)),

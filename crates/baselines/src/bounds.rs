@@ -28,7 +28,8 @@ pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, 
     for scene in dataset.scenes.iter().filter(|scene| !dataset.folder(&scene.id).truth().exists()) {
         dataset.check_files(&scene.id, |path| path.starts_with("ground_truth/materials/"))?;
     }
-    let method = Method::new("gt", "the true materials baked to the dataset's own atlases");
+    let method =
+        Method { is_oracle: true, ..Method::new("gt", "the true materials baked to the dataset's own atlases") };
     write(dataset, out, force, &method, |scene, instance, folder| {
         let truth = dataset.folder(&scene.id).truth_material(&instance.id);
         for map in Map::ALL {

@@ -184,7 +184,8 @@ pub fn import_texgen(
         source.description(dataset)
     );
     let assumed_encodings = source.assumed_encodings();
-    let method = Method { name: format!("texgen-{}", source.name()), description, assumed_encodings };
+    let name = format!("texgen-{}", source.name());
+    let method = Method { name, description, assumed_encodings, is_oracle: source.is_truth() };
     let instances = submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene, progress)?;

@@ -68,6 +68,11 @@ impl EstimateSource {
         }
     }
 
+    /// Whether it is the ground truth, so that what is made from it is a bound and no method.
+    pub const fn is_truth(&self) -> bool {
+        matches!(self, Self::Truth)
+    }
+
     /// Which of a method's pictures are read for the dataset's scenes, and which lie beside them and are not; `None`
     /// for other estimates.
     pub fn files_read(&self, dataset: &Dataset) -> Option<String> {

@@ -45,7 +45,7 @@ impl MedianOf<'_> {
              colour 0.5 (linear)",
             source.description(dataset)
         );
-        Method { name, description, assumed_encodings: source.assumed_encodings() }
+        Method { name, description, assumed_encodings: source.assumed_encodings(), is_oracle: source.is_truth() }
     }
 }
 

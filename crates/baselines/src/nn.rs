@@ -66,6 +66,7 @@ pub fn write(
         name: format!("nn-{}", source.name()),
         description: options.description(&source.description(dataset)),
         assumed_encodings: source.assumed_encodings(),
+        is_oracle: source.is_truth(),
     };
     submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         write_scene(dataset, scene, folder, source, options, progress)

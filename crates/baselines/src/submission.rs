@@ -21,13 +21,15 @@ pub struct Method {
     pub description: String,
     /// By map, the encodings that an adapter assumed.
     pub assumed_encodings: BTreeMap<Map, StoredEncoding>,
+    /// Whether it reads the ground truth.
+    pub is_oracle: bool,
 }
 
 impl Method {
     /// A method with this name and description, which assumes no encodings.
     pub fn new(name: &str, description: &str) -> Self {
         let (name, description) = (name.to_owned(), description.to_owned());
-        Self { name, description, assumed_encodings: BTreeMap::new() }
+        Self { name, description, assumed_encodings: BTreeMap::new(), is_oracle: false }
     }
 }
 
@@ -93,6 +95,8 @@ pub fn write_scenes(
         url: None,
         licence: None,
         cost: None,
+        trained_on: Vec::new(),
+        oracle: method.is_oracle,
         assumed_encodings: method.assumed_encodings.clone(),
         geometry: dataset.file.perturbation(),
         dataset_manifest_sha256: dataset.file.scored_manifest_sha256().to_owned(),

@@ -419,6 +419,7 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
         protocol: PROTOCOL,
         partial: false,
         errata: None,
+        about: None,
         pictures: None,
         submissions: Some(Submissions {
             dataset,

@@ -11,7 +11,7 @@ use mateval_files::work_folder::is_inside;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::{DatasetFile, DatasetVersion, FORMAT, SceneFile, TargetsFile, WideView};
+use crate::dataset::{DatasetFile, DatasetVersion, FORMAT, SceneFile, Secrecy, TargetsFile, WideView};
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use crate::{DatasetError, Finding, RendererId, SceneId, Severity, SourceKind, ViewId, changes, json, manifest};
 
@@ -290,6 +290,9 @@ pub struct DatasetId {
     /// The renderer that made the input pictures; null where none made all of them.
     #[serde(default)]
     pub photo_renderer: Option<RendererId>,
+    /// Whether its ground truth is withheld and what that is worth; absent where it is not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub withheld: Option<Secrecy>,
 }
 
 impl DatasetId {
@@ -312,6 +315,7 @@ impl DatasetId {
             sources: scenes.iter().map(|scene| (scene.id.clone(), scene.source.kind)).collect(),
             wide_views: scenes.iter().filter_map(|scene| Some((scene.id.clone(), wide_views(scene)?))).collect(),
             photo_renderer: dataset.file.photo_renderer.clone(),
+            withheld: dataset.file.withheld,
         }
     }
 }

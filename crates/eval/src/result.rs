@@ -83,6 +83,12 @@ pub struct SubmissionId {
     /// What the method costs to run, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
+    /// Datasets that the method was trained on, as stated by the submission.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trained_on: Vec<String>,
+    /// Whether the submission states that it was made from the ground truth.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub oracle: bool,
     /// How the geometry that it was made from differs from the true one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<Perturbation>,

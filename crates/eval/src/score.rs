@@ -385,6 +385,8 @@ fn finish(
             url: entry.file.url,
             licence: entry.file.licence,
             cost: entry.file.cost,
+            trained_on: entry.file.trained_on,
+            oracle: entry.file.oracle,
             geometry: entry.file.geometry,
         },
         dataset: DatasetId::new(plan.dataset, scored.iter().copied()),

@@ -26,7 +26,8 @@ use crate::long_work::{failed, unknown_id};
 /// Writes a submission. Its folder appears when the `with` block ends without an exception, or when `close` is called;
 /// until then it is hidden beside its place, and a failed or killed program leaves nothing at that place.
 ///
-/// cost is a dictionary with `seconds_a_scene` and, optionally, `hardware`. force replaces an earlier submission.
+/// cost is a dictionary with `seconds_a_scene` and, optionally, `hardware`. trained_on lists the datasets that the method
+/// was trained on, as in "3D-FRONT"; boards mark those that their scenes come from. force replaces an earlier submission.
 #[pyclass(frozen, module = "mateval")]
 pub struct Submission {
     dataset: Arc<OpenDataset>,
@@ -55,7 +56,7 @@ impl Drop for OpenFolder {
 impl Submission {
     /// Starts a submission to the dataset, open or the path of its folder, in the folder `out`, which must not exist.
     #[new]
-    #[pyo3(signature = (out, dataset, *, method, description=String::new(), url=None, licence=None, cost=None, force=false))]
+    #[pyo3(signature = (out, dataset, *, method, description=String::new(), url=None, licence=None, cost=None, trained_on=Vec::new(), force=false))]
     #[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         out: PathBuf,
@@ -65,6 +66,7 @@ impl Submission {
         url: Option<String>,
         licence: Option<String>,
         cost: Option<Bound<'_, PyDict>>,
+        trained_on: Vec<String>,
         force: bool,
     ) -> PyResult<Self> {
         let dataset = opened(dataset)?;
@@ -75,6 +77,8 @@ impl Submission {
             url,
             licence,
             cost: cost.map(|cost| cost_of(&cost)).transpose()?,
+            trained_on,
+            oracle: false,
             assumed_encodings: std::collections::BTreeMap::new(),
             geometry: dataset.file.perturbation(),
             dataset_manifest_sha256: dataset.file.scored_manifest_sha256().to_owned(),

@@ -143,7 +143,7 @@ fn method(dataset: &Dataset, source: &EstimateSource, options: &ProceduralOption
         options.detail,
         &library_sha256()[..12]
     );
-    Method { name, description, assumed_encodings: source.assumed_encodings() }
+    Method { name, description, assumed_encodings: source.assumed_encodings(), is_oracle: source.is_truth() }
 }
 
 /// The most files that are read.

@@ -252,8 +252,8 @@ pub struct LeaderboardArgs {
     #[arg(required_unless_present = "from", value_name = "RESULT.json")]
     results: Vec<PathBuf>,
     /// Folder of results, as collected by pull requests: every .json file in it and in the folders below it. In the
-    /// folder itself, ceiling.json is taken for `--ceiling` and errata.json for `--errata`.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["results", "ceiling", "errata"])]
+    /// folder itself, ceiling.json is taken for `--ceiling`, errata.json for `--errata` and about.md for `--about`.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["results", "ceiling", "errata", "about"])]
     from: Option<PathBuf>,
     /// RESULT.json of the truth itself (`mateval baseline gt`), shown below the methods as the ceiling of each column.
     #[arg(long, value_name = "RESULT.json")]
@@ -288,6 +288,9 @@ pub struct LeaderboardArgs {
     /// JSON file of errors that were found after publication.
     #[arg(long)]
     errata: Option<PathBuf>,
+    /// Markdown file for the page "About": contact, licence of the dataset, the paper, how to submit.
+    #[arg(long, value_name = "FILE.md")]
+    about: Option<PathBuf>,
     /// Replace a leaderboard that already exists.
     #[arg(long)]
     force: bool,
@@ -303,6 +306,7 @@ impl LeaderboardArgs {
                 results: self.results.clone(),
                 ceiling: self.ceiling.clone(),
                 errata: self.errata.clone(),
+                about: self.about.clone(),
                 skipped: Vec::new(),
             },
         };
@@ -334,6 +338,7 @@ impl LeaderboardArgs {
             protocol: &self.protocol,
             partial: self.partial,
             errata: entries.errata.as_ref(),
+            about: entries.about.as_deref(),
             pictures: self.pictures.as_deref(),
             submissions: dataset.as_ref().map(|dataset| Submissions {
                 dataset,

@@ -40,6 +40,12 @@ pub struct SubmissionFile {
     /// The cost as its makers state it, unchecked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
+    /// Datasets that the method was trained on, as in `3D-FRONT`; boards mark those that their scenes come from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trained_on: Vec<String>,
+    /// Whether it was made from the ground truth: a bound, and no method.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub oracle: bool,
     /// By map, the encodings of the method's pictures that its authors do not state, and that the adapter assumed.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub assumed_encodings: BTreeMap<Map, StoredEncoding>,

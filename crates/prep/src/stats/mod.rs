@@ -398,6 +398,7 @@ mod tests {
                 photo_renderer: None,
                 licences: Vec::new(),
                 geometry: None,
+                withheld: None,
                 manifest_sha256: String::new(),
             },
             targets: TargetsFile { format: FORMAT.to_owned(), targets: Vec::new() },

@@ -177,6 +177,7 @@ mod tests {
             photo_renderer: None,
             licences: Vec::new(),
             geometry: None,
+            withheld: None,
             manifest_sha256: String::new(),
         };
         let found = |dataset: &DatasetFile| {

@@ -1,7 +1,7 @@
 //! Everything that the pages of a leaderboard are made from.
 
-use mateval_dataset::SceneId;
 use mateval_dataset::layout::INPUT;
+use mateval_dataset::{SceneId, SourceKind};
 use mateval_eval::metric::PictureKind;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use serde::Serialize;
@@ -46,6 +46,9 @@ impl<'a> Board<'a> {
                 url: submission.url,
                 licence: submission.licence,
                 cost: submission.cost,
+                overlap: overlap(&submission.trained_on, result.dataset.sources.values()),
+                trained_on: submission.trained_on,
+                oracle: submission.oracle,
                 verified: *verified,
             }
         };
@@ -109,6 +112,21 @@ impl<'a> Board<'a> {
         let values = self.scores[at].scenes.get(scene);
         columns.iter().map(|column| Some(column.text(*values?.get(&column.key)?))).collect()
     }
+}
+
+/// The datasets among `trained_on` that scenes of these sources come from: a method may have seen their truth.
+fn overlap<'a>(trained_on: &[String], sources: impl Iterator<Item = &'a SourceKind>) -> Vec<String> {
+    let plain = |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
+    let names: Vec<&str> = sources
+        .flat_map(|kind| match kind {
+            // 3D-FRONT's furniture is 3D-FUTURE's.
+            SourceKind::Front3d => ["3dfront", "3dfuture"].as_slice(),
+            SourceKind::Bitterli => &["bitterli"],
+            _ => &[],
+        })
+        .copied()
+        .collect();
+    trained_on.iter().filter(|trained| names.iter().any(|name| plain(trained).contains(name))).cloned().collect()
 }
 
 /// The scores of the truth's `result`. Fails if it was not scored on the scenes and under the rules of the ranking.

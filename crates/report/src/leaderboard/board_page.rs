@@ -159,13 +159,14 @@ fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column, columns: &[&Column])
 }
 
 /// The pictures of the best methods that have some in a scene, at most [`BEST`] of them: in the first scene with the
-/// most such methods. None without pictures.
+/// most such methods. What was made from the truth is no method. None without pictures.
 fn best_pictures<'a>(
     board: &'a Board<'_>,
     site: &SiteWriter<'_>,
     first: &Column,
     rows: &[Row<'a>],
 ) -> Option<BestPictures<'a>> {
+    let methods = || rows.iter().filter(|row| !row.method.oracle);
     let in_scene = |scene: &'a SceneId| {
         let pictures = |row: &Row<'a>| {
             let score = format!("{} {}", first.metric_title, first.text(row.value?));
@@ -177,7 +178,7 @@ fn best_pictures<'a>(
                 pictures,
             })
         };
-        BestPictures { scene, methods: rows.iter().filter_map(pictures).take(BEST).collect() }
+        BestPictures { scene, methods: methods().filter_map(pictures).take(BEST).collect() }
     };
     let scenes = board.ranking().scenes.iter().map(in_scene).filter(|best| !best.methods.is_empty());
     scenes.min_by_key(|best| Reverse(best.methods.len()))

@@ -147,9 +147,10 @@ pub(super) fn choices(columns: &[Column]) -> Choices {
 
 /// The columns that hold no scores, from left to right, behind those that do: what is known about a method besides its
 /// numbers. A new column is one entry.
-pub(super) const FACTS: [FactColumn; 3] = [
+pub(super) const FACTS: [FactColumn; 4] = [
     FactColumn { key: "numbers", title: "Numbers", is_word: true, of: numbers },
     FactColumn { key: "cost", title: "Seconds a scene", is_word: false, of: cost },
+    FactColumn { key: "trained_on", title: "Trained on", is_word: true, of: trained_on },
     FactColumn { key: "licence", title: "Licence", is_word: true, of: licence },
 ];
 
@@ -198,6 +199,18 @@ fn cost(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
     Some(Fact { value, text: seconds(cost.seconds_a_scene), note: shortened(&cost.hardware) })
 }
 
+fn trained_on(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
+    if method.trained_on.is_empty() {
+        return None;
+    }
+    let text = method.trained_on.join(", ");
+    let note = match method.overlap.as_slice() {
+        [] => String::new(),
+        names => format!("scenes come from {}", shortened(&names.join(", "))),
+    };
+    Some(Fact { value: text.clone(), text: shortened(&text), note })
+}
+
 fn licence(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
     let licence = method.licence.as_ref().filter(|licence| !licence.is_empty())?;
     Some(Fact { value: licence.clone(), text: shortened(licence), note: String::new() })
@@ -224,6 +237,7 @@ pub(super) struct MethodHead {
     pub(super) id: String,
     pub(super) name: String,
     pub(super) verified: Verified,
+    pub(super) oracle: bool,
     description: String,
     /// Only if it leads to a web page, as the submission is untrusted.
     link: Option<String>,
@@ -255,6 +269,7 @@ impl MethodHead {
             id: ranked.id.clone(),
             name: ranked.method.clone(),
             verified: method.verified,
+            oracle: method.oracle,
             description: method.description.clone(),
             link: method.url.clone().filter(is_page),
             licence: method.licence.clone().filter(|licence| !licence.is_empty()),

@@ -13,7 +13,7 @@ use mateval_eval::protocol::Track;
 use mateval_eval::result::key::{Region, ResultKey, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
 use mateval_files::FileError;
-use mateval_files::untrusted::{nearest, shortened};
+use mateval_files::untrusted::{nearest, read_at_most, shortened};
 use mateval_submission::lint::submission_json::check_method_name;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,9 @@ const CEILING: &str = "ceiling.json";
 /// The file of errors that were found after publication.
 const ERRATA: &str = "errata.json";
 
+/// What the board's keeper says about it.
+const ABOUT: &str = "about.md";
+
 /// The format of this version of errata.
 pub const ERRATA_FORMAT: &str = "mateval-errata/1";
 
@@ -36,11 +39,11 @@ pub const ERRATA_FORMAT: &str = "mateval-errata/1";
 const UNFIT: &str = "correct it, or leave it out: a folder of results holds NAME.json as `mateval eval score --out` \
                      writes it, NAME.verified.json as `mateval eval verify --out` writes it, its \
                      signature NAME.verified.json.minisig, and in the folder itself \
-                     ceiling.json, a result, and errata.json";
+                     ceiling.json, a result, errata.json and about.md";
 
 /// The files of a folder in which a leaderboard's results are collected, for example by pull requests.
 ///
-/// `ceiling.json` and `errata.json` lie in the folder itself. Every other `.json` file, there or in a folder directly
+/// `ceiling.json`, `errata.json` and `about.md` lie in the folder itself. Every other `.json` file, there or in a folder directly
 /// below it (for example one for each method), is a result or, if it ends in `.verified.json`, the verification of one.
 /// Hidden files and those that systems leave behind are skipped.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -50,6 +53,8 @@ pub struct ResultsFolder {
     /// The file of the truth's result.
     pub ceiling: Option<PathBuf>,
     pub errata: Option<PathBuf>,
+    /// Markdown about the board.
+    pub about: Option<PathBuf>,
     /// `.json` files and folders that are skipped because of their names.
     pub skipped: Vec<PathBuf>,
 }
@@ -77,6 +82,7 @@ impl ResultsFolder {
                 _ if kind.is_dir() => folders.push(path),
                 Some(CEILING) => found.ceiling = Some(regular_file(path, kind)?),
                 Some(ERRATA) => found.errata = Some(regular_file(path, kind)?),
+                Some(ABOUT) => found.about = Some(regular_file(path, kind)?),
                 name => found.add(name, path.clone(), kind)?,
             }
         }
@@ -122,7 +128,12 @@ pub struct Entries {
     /// The result of the truth.
     pub ceiling: Option<ResultFile>,
     pub errata: Option<ErrataFile>,
+    /// Markdown about the board.
+    pub about: Option<String>,
 }
+
+/// No text about a board is larger, in bytes.
+const MOST_ABOUT_BYTES: u64 = 1 << 20;
 
 /// Reads the files. Fails with every reason for which they cannot make a board: a file is something else, a board
 /// cannot show the name of a method, or two results have the same name or submission. A file that the system does not
@@ -145,6 +156,10 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
     }
     if let Some(path) = &files.errata {
         entries.errata = fitting(ErrataFile::read(path), "errata", path, UNFIT, &mut findings)?;
+    }
+    if let Some(path) = &files.about {
+        let bytes = read_at_most(path, MOST_ABOUT_BYTES).map_err(FileError::io("read", path))?;
+        entries.about = Some(String::from_utf8_lossy(&bytes).into_owned());
     }
     let results = &entries.results;
     let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
@@ -171,6 +186,8 @@ pub struct LeaderboardPlan<'a> {
     pub partial: bool,
     /// Faults that were found after publication.
     pub errata: Option<&'a ErrataFile>,
+    /// What its keeper says about the board, in Markdown.
+    pub about: Option<&'a str>,
     /// A set of pictures to show; see `pictures`.
     pub pictures: Option<&'a Path>,
     /// Submissions to draw pictures of.

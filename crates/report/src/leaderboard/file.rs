@@ -62,6 +62,12 @@ pub struct LeaderboardMethod {
     pub licence: Option<String>,
     /// Its cost.
     pub cost: Option<Cost>,
+    /// Datasets that it was trained on.
+    pub trained_on: Vec<String>,
+    /// Those of them from which scenes of the dataset come.
+    pub overlap: Vec<String>,
+    /// Whether it was made from the ground truth: a bound, and no method.
+    pub oracle: bool,
     /// Whether its result was verified.
     pub verified: Verified,
 }

@@ -64,7 +64,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     scene_page::write_rooms(&board, &site)?;
     curves::write_wide_views(&board, &site)?;
     curves::write_perturbed(&board, &site)?;
-    reference_pages::write(&board, plan.errata, &site)?;
+    reference_pages::write(&board, plan, &site)?;
     Ok(work.finish()?)
 }
 
@@ -128,6 +128,7 @@ mod tests {
             protocol: "mateval-3",
             partial: false,
             errata: None,
+            about: Some("Send it to *us*."),
             pictures: None,
             submissions: None,
             tool: "mateval".to_owned(),

@@ -1,7 +1,7 @@
 //! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers
 //! were measured on other renders and are never ranked with results.
 
-use mateval_dataset::dataset::DatasetVersion;
+use mateval_dataset::dataset::{DatasetVersion, Secrecy};
 use mateval_eval::metric::{Better, Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::key::Views;
@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::board::Board;
-use super::entries::ErrataFile;
+use super::entries::LeaderboardPlan;
+use super::marks::Verified;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::ranking::file::{IntervalKind, RankingRules};
@@ -19,8 +20,9 @@ use crate::tables::{BlockWords, PAPER, TableWords};
 
 const TABLES: &str = include_str!("paper_tables.json");
 
-/// Writes `protocol.html`, `paper.html` and `errata.html`.
-pub(super) fn write(board: &Board<'_>, errata: Option<&ErrataFile>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+/// Writes `about.html`, `protocol.html`, `paper.html` and `errata.html`.
+pub(super) fn write(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    write_about(board, plan, site)?;
     write_protocol(board, site)?;
     let paper = paper_page();
     site.page(&Page {
@@ -30,13 +32,31 @@ pub(super) fn write(board: &Board<'_>, errata: Option<&ErrataFile>, site: &SiteW
         scripts: &["sort.js"],
         values: context! { paper => Serde(&paper) },
     })?;
-    let errata = errata.map_or(&[][..], |errata| &errata.entries);
+    let errata = plan.errata.map_or(&[][..], |errata| &errata.entries);
     site.page(&Page {
         file: "errata.html",
         template: "errata.j2",
         title: "Errata",
         scripts: &[],
         values: context! { errata => Serde(errata) },
+    })
+}
+
+/// Writes `about.html`: what the keeper says, and what holds for every board.
+fn write_about(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let mut said = String::new();
+    pulldown_cmark::html::push_html(&mut said, pulldown_cmark::Parser::new(plan.about.unwrap_or_default()));
+    let withheld = board.results.first().and_then(|result| result.dataset.withheld).map(Secrecy::text);
+    let count = |state| plan.verified.iter().filter(|mark| **mark == state).count();
+    site.page(&Page {
+        file: "about.html",
+        template: "about.j2",
+        title: "About",
+        scripts: &[],
+        values: context! {
+            said, withheld, dataset => Serde(&board.file.dataset),
+            verified => count(Verified::Confirmed), claimed => count(Verified::Claimed) + count(Verified::Stale),
+        },
     })
 }
 

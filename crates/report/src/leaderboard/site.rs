@@ -21,7 +21,7 @@ const ASSETS: [(&str, &str); 6] = [
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 12] = [
+const TEMPLATES: [(&str, &str); 13] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
     ("board.j2", include_str!("templates/board.j2")),
@@ -31,6 +31,7 @@ const TEMPLATES: [(&str, &str); 12] = [
     ("room.j2", include_str!("templates/room.j2")),
     ("protocol.j2", include_str!("templates/protocol.j2")),
     ("paper.j2", include_str!("templates/paper.j2")),
+    ("about.j2", include_str!("templates/about.j2")),
     ("errata.j2", include_str!("templates/errata.j2")),
     ("wide_views.j2", include_str!("templates/wide_views.j2")),
     ("perturbed.j2", include_str!("templates/perturbed.j2")),
@@ -59,12 +60,13 @@ pub(super) struct PageLink {
 }
 
 /// The menu of every site.
-pub(super) const PAGES: [PageLink; 5] = [
+pub(super) const PAGES: [PageLink; 6] = [
     PageLink { file: "index.html", title: "Leaderboard" },
     PageLink { file: "scenes.html", title: "Scenes" },
     PageLink { file: "protocol.html", title: "Protocol" },
     PageLink { file: "paper.html", title: "The paper's numbers" },
     PageLink { file: "errata.html", title: "Errata" },
+    PageLink { file: "about.html", title: "About" },
 ];
 
 /// The entry of a site whose scenes have views from other places.

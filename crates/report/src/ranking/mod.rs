@@ -437,6 +437,8 @@ pub(crate) mod tests {
                 url: None,
                 licence: None,
                 cost: None,
+                trained_on: Vec::new(),
+                oracle: false,
                 geometry: None,
             },
             dataset: DatasetId {
@@ -449,6 +451,7 @@ pub(crate) mod tests {
                 houses: ids.iter().map(|id| (id.clone(), format!("house of {id}"))).collect(),
                 scenes: ids,
                 photo_renderer: None,
+                withheld: None,
             },
             lpips_weights: BTreeMap::from([("alex".to_owned(), None)]),
             protocols: BTreeMap::from([("mateval-3".to_owned(), scores)]),

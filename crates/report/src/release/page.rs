@@ -228,7 +228,7 @@ fn without_bound(name: &str, method: &str, scores: Option<&ReferenceScores>, all
 mod tests {
     use std::collections::BTreeMap;
 
-    use mateval_dataset::dataset::DatasetVersion;
+    use mateval_dataset::dataset::{DatasetVersion, Secrecy};
     use mateval_dataset::scene_cost::{Step, StepCost};
     use mateval_dataset::{SceneId, SourceKind, ViewId};
     use mateval_eval::result::key::ResultKey;
@@ -427,7 +427,7 @@ mod tests {
     #[test]
     fn a_withheld_truth_leaves_verdicts_and_means() {
         let mut file = release();
-        withhold(&mut file, "c0ffee".to_owned());
+        withhold(&mut file, Secrecy::Secret, "c0ffee");
         let html = page(&file);
         for text in ["scene 180 is broken", "1.2345678", "12.3 %", "36.0", "9.51 –"] {
             assert!(!html.contains(text), "'{text}' leaks");
@@ -438,7 +438,7 @@ mod tests {
         }
         // The mean over one scene is a score.
         file.ceiling.as_mut().unwrap().scenes_scored = 1;
-        withhold(&mut file, "c0ffee".to_owned());
+        withhold(&mut file, Secrecy::Secret, "c0ffee");
         assert!(file.ceiling.unwrap().summary.is_empty() && !file.floor.unwrap().summary.is_empty());
     }
 
@@ -458,7 +458,7 @@ mod tests {
         let mut alone = release();
         alone.ceiling.as_mut().unwrap().scenes.as_mut().unwrap().retain(|id, _| *id == first);
         for file in [&mut file, &mut alone] {
-            withhold(file, "c0ffee".to_owned());
+            withhold(file, Secrecy::Secret, "c0ffee");
             assert!(!file.floor.as_ref().unwrap().summary.is_empty());
         }
         let left = file.ceiling.unwrap().summary;

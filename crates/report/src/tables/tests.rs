@@ -41,6 +41,8 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
             url: None,
             licence: None,
             cost: None,
+            trained_on: Vec::new(),
+            oracle: false,
             geometry: None,
         },
         dataset: DatasetId {
@@ -53,6 +55,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
             sources: Default::default(),
             houses: BTreeMap::new(),
             photo_renderer: None,
+            withheld: None,
         },
         lpips_weights: BTreeMap::new(),
         protocols: BTreeMap::from([("paper".to_owned(), scores)]),

@@ -209,6 +209,7 @@ mod tests {
             houses: Default::default(),
             wide_views: Default::default(),
             photo_renderer: None,
+            withheld: None,
         };
         let text = plain(&LintFile::new("", None, dataset, 1, findings));
         let expected = "error [nan] 'f0': a NaN; fix it (6 times; also 'f1', 'f2', 'f3', ...)\n\

@@ -12,13 +12,15 @@ use crate::error::{FileFault, error, finding, warning};
 use crate::files::{SubmittedFile, exists};
 
 /// Its keys, the kinds of value that each may have, and whether it must be given. They are those of [`SubmissionFile`].
-const KEYS: [(&str, &[&str], bool); 9] = [
+const KEYS: [(&str, &[&str], bool); 11] = [
     ("format", &["a string"], true),
     ("method", &["a string"], true),
     ("description", &["a string"], false),
     ("url", &["a string", "null"], false),
     ("licence", &["a string", "null"], false),
     ("cost", &["an object", "null"], false),
+    ("trained_on", &["an array"], false),
+    ("oracle", &["a boolean"], false),
     ("assumed_encodings", &["an object"], false),
     ("geometry", &["an object", "null"], false),
     ("dataset_manifest_sha256", &["a string"], true),
@@ -257,6 +259,8 @@ mod tests {
             url: Some("https://example.org".to_owned()),
             licence: Some("MIT".to_owned()),
             cost: Some(Cost { seconds_a_scene: 1.5, hardware: "a laptop".to_owned() }),
+            trained_on: vec!["3D-FRONT".to_owned()],
+            oracle: true,
             assumed_encodings: [(mateval_dataset::submission::Map::Roughness, StoredEncoding::Linear)].into(),
             geometry: Some(Perturbation { kind: PerturbationKind::Pose, level: 1 }),
             dataset_manifest_sha256: "0".repeat(64),
