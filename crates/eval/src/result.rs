@@ -58,13 +58,6 @@ impl ResultFile {
             Some(perturbation) => format!("{} ({perturbation})", self.method),
         }
     }
-
-    /// The fingerprint that these of its scores would have if these scenes had been scored; without scenes, a hash of
-    /// everything else that scores depend on.
-    pub fn basis(&self, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
-        let weights = self.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
-        scores.protocol.fingerprint(&self.dataset.manifest_sha256, scenes, weights)
-    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -150,10 +150,16 @@ impl<'a> Entrant<'a> {
         self.result.shown_method()
     }
 
-    /// See [`ResultFile::basis`].
     fn basis(&self, scenes: &[&SceneId]) -> String {
-        self.result.basis(self.scores, scenes)
+        basis(self.result, self.scores, scenes)
     }
+}
+
+/// The fingerprint that these scores of a result would have if these scenes had been scored; without scenes, a hash of
+/// everything else that scores depend on.
+pub(crate) fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
+    let weights = result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
+    scores.protocol.fingerprint(&result.dataset.manifest_sha256, scenes, weights)
 }
 
 struct Board<'a> {
