@@ -260,19 +260,6 @@ word_enum! {
 }
 
 impl PictureKind {
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Albedo => "Albedo",
-            Self::AlbedoAligned => "Aligned albedo",
-            Self::RgbTrue => "RGB, true light",
-            Self::RgbFitted => "RGB, fitted light",
-            Self::RgbRelit => "RGB, relit",
-            Self::Roughness => "Roughness",
-            Self::Metallic => "Metallic",
-            Self::TextureBaseColor => "Base colour texels",
-        }
-    }
-
     /// The map that it shows; none for light, which comes from all of them.
     pub const fn map(self) -> Option<Map> {
         match self {
