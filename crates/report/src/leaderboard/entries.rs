@@ -138,11 +138,11 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
         entries.results.push(result);
         paths.push(path.as_path());
     }
-    if let Some(path) = &files.ceiling {
-        if let Some(result) = read_result(path, &mut findings)? {
-            findings.extend(not_the_truth(path, &result, trust));
-            entries.ceiling = Some(result);
-        }
+    if let Some(path) = &files.ceiling
+        && let Some(result) = read_result(path, &mut findings)?
+    {
+        findings.extend(not_the_truth(path, &result, trust));
+        entries.ceiling = Some(result);
     }
     if let Some(path) = &files.errata {
         entries.errata = fitting(ErrataFile::read(path), "errata", path, UNFIT, &mut findings)?;
