@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds, renders and verifies every scene file below a folder, and writes a page of what happened:
-# tools/test_corpus.sh FOLDER [OUT]. test_corpus.py, which does it, states what is found, tried and counted as a failure.
+# tools/test_corpus.sh FOLDER [OUT]. corpus/test_corpus.py, which does it, states what is found, tried and counted as a
+# failure.
 # `--self-test` instead of FOLDER checks the outcomes of files that it makes.
 #
 # MATEVAL names the command; by default it is the tests' build.
@@ -12,4 +13,4 @@ if [ -z "${MATEVAL:-}" ]; then
     (cd "$root" && cargo test --workspace --no-run --quiet)
     MATEVAL="$target/debug/mateval"
 fi
-exec python3 "$root/tools/test_corpus.py" --mateval "$MATEVAL" --default-out "$target/corpus" "$@"
+exec python3 "$root/tools/corpus/test_corpus.py" --mateval "$MATEVAL" --default-out "$target/corpus" "$@"

@@ -50,15 +50,10 @@ pub enum EvalError {
     #[error("cannot score: there is no protocol '{name}'; use one of: {}", known.join(", "))]
     UnknownProtocol { name: String, known: &'static [&'static str] },
     #[error(
-        "cannot score: protocol '{protocol}' expects version {found} of the scorer, this is version {expected}; \
-         use the protocols of this version"
-    )]
-    ScorerVersion { protocol: String, expected: u32, found: u32 },
-    #[error(
-        "cannot score: protocol '{protocol}' states fixed.{rule} = {found}, the code has {expected}, which no protocol can \
+        "cannot score: protocol '{protocol}' states {rule} = {found}, the code has {expected}, which no protocol can \
          change; use the protocols of this version"
     )]
-    FixedRule { protocol: String, rule: String, expected: String, found: String },
+    OtherRule { protocol: String, rule: String, expected: String, found: String },
     /// The loaded network of LPIPS is not the one whose numbers results hold.
     #[error(
         "cannot score: expected the weights of LPIPS' network '{expected}', found those of '{found}'; load '{expected}'"

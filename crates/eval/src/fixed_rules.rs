@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::light::difference::{DIFFERENCE, DifferenceRules};
-use crate::light::error::ONE_SIDED_95;
+use crate::light::mse::ONE_SIDED_95;
 use crate::metric::{HALF_A_BYTE, LPIPS_NET};
 
 /// Defines [`FixedRules`] and its one value: name, type and constant of every rule stand together.
@@ -129,12 +129,12 @@ fixed_rules! {
 }
 
 impl FixedRules {
-    /// The first constant, by name, in which the two differ, and both of its values as JSON.
+    /// The key, as in `fixed.ssim_k1`, of the first constant, by name, in which the two differ, and both of its values as JSON.
     pub fn first_difference(&self, other: &Self) -> Option<(String, [String; 2])> {
         let values = |rules: &Self| serde_json::to_value(rules).expect("numbers and words become JSON");
         let (ours, theirs) = (values(self), values(other));
         let map = ours.as_object().expect("a struct becomes an object");
         let (rule, value) = map.iter().find(|(rule, value)| theirs[rule.as_str()] != **value)?;
-        Some((rule.clone(), [value.to_string(), theirs[rule.as_str()].to_string()]))
+        Some((format!("fixed.{rule}"), [value.to_string(), theirs[rule.as_str()].to_string()]))
     }
 }

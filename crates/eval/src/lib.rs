@@ -10,11 +10,11 @@
 //! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]), removes their scale, and compares
 //!    the pictures with the [`truth`]'s.
 //! 2. [`light`] renders the maps under every light and compares the renders with R, the scorer's own render of the true
-//!    maps ([`light::reference`]). The true maps travel along the paths of every prediction (`light::paths`,
-//!    [`light::predictions`]), so that what few paths miss or exaggerate of both cancels: [`light::difference`] turns
+//!    maps ([`light::reference`]). The true maps travel along the paths of every prediction (`light::shared_paths`,
+//!    [`light::own_lights`]), so that what few paths miss or exaggerate of both cancels: [`light::difference`] turns
 //!    four quarters into two estimates of the encoded difference from R, which are exactly zero for the true maps, and
-//!    [`light::error`] states their noise. Protocol `paper` compares with the photo's renderer instead
-//!    ([`light::fitted`]).
+//!    [`light::mse`] states their noise. Protocol `paper` compares with the photo's renderer instead
+//!    ([`light::fitted_lights`]).
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
@@ -43,13 +43,13 @@ pub mod materials {
 pub mod light {
     //! Submissions under light.
     pub mod difference;
-    pub mod error;
-    pub mod fitted;
+    pub mod fitted_lights;
     pub mod lighting;
-    pub(crate) mod paths;
-    pub mod predictions;
+    pub mod mse;
+    pub mod own_lights;
     pub mod reference;
     pub(crate) mod score;
+    pub(crate) mod shared_paths;
 }
 
 pub use error::EvalError;

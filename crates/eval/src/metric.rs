@@ -48,12 +48,25 @@ impl NumberStyle {
 /// A value; absent where no pixel or window counts.
 type Measured = Result<Option<f64>, MetricError>;
 
-/// Two pictures of colours, clipped to 0..1 and encoded, with what windows and networks need besides.
+/// A picture of colours as metrics see it.
+pub struct ColorPicture {
+    pub linear: Picture<LinearRgb>,
+    /// Clipped to 0..1 and encoded, for windows and networks.
+    pub encoded: Picture<SrgbRgb>,
+    /// What LPIPS compares of a reference, which many predictions share.
+    features: ReferenceFeatures,
+}
+
+impl ColorPicture {
+    pub fn new(linear: Picture<LinearRgb>) -> Self {
+        Self { encoded: linear.to_srgb(), linear, features: ReferenceFeatures::default() }
+    }
+}
+
+/// An encoded prediction and its reference, with what windows and networks need besides.
 pub struct EncodedPair<'a> {
     pub prediction: &'a Picture<SrgbRgb>,
-    pub reference: &'a Picture<SrgbRgb>,
-    /// Those of the reference, which is compared with many predictions.
-    pub features: &'a ReferenceFeatures,
+    pub reference: &'a ColorPicture,
     pub mask: &'a Mask,
     pub mask_rule: MaskRule,
     /// Without its weights LPIPS has no value.
@@ -158,7 +171,7 @@ metrics! {
         style: style("SSIM", 1.0, 4),
         better: Better::Higher,
         of: &[COLOURS],
-        measure: Measure::Encoded(|pair| Ok(pair.mask_rule.ssim(pair.prediction, pair.reference, pair.mask)?.0)),
+        measure: Measure::Encoded(|pair| Ok(pair.mask_rule.ssim(pair.prediction, &pair.reference.encoded, pair.mask)?.0)),
         stated: Stated::Exactly,
         definition: "Wang et al. 2004, of clipped, sRGB-encoded colours: 11x11 Gaussian window, sigma 1.5, K1 = 0.01, \
             K2 = 0.03, population covariance, mean over channels and over the windows that lie wholly inside the mask",
@@ -167,8 +180,8 @@ metrics! {
         style: style("LPIPS", 1.0, 4),
         better: Better::Lower,
         of: &[COLOURS],
-        measure: Measure::Encoded(|EncodedPair { prediction, reference, features, mask, mask_rule, lpips }| match lpips {
-            Some(lpips) => mask_rule.lpips(lpips, prediction, reference, features, mask),
+        measure: Measure::Encoded(|EncodedPair { prediction, reference, mask, mask_rule, lpips }| match lpips {
+            Some(lpips) => mask_rule.lpips(lpips, prediction, &reference.encoded, &reference.features, mask),
             None => Ok(None),
         }),
         // The last bits depend on the processor.
@@ -181,7 +194,7 @@ metrics! {
         style: style("FLIP", 1.0, 4),
         better: Better::Lower,
         of: &[&[PictureKind::RgbTrue]],
-        measure: Measure::Encoded(|pair| flip(pair.prediction, pair.reference, pair.mask)),
+        measure: Measure::Encoded(|pair| flip(pair.prediction, &pair.reference.encoded, pair.mask)),
         stated: Stated::Rounded { tolerance: 0.0 },
         definition: "Andersson et al. 2020, LDR, of clipped, sRGB-encoded colours: 67.0206 pixels per degree, separable \
             filters as in `flip-evaluator`, edge pixels repeated beyond the border; outside the mask the prediction \
@@ -247,19 +260,6 @@ word_enum! {
 }
 
 impl PictureKind {
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Albedo => "Albedo",
-            Self::AlbedoAligned => "Aligned albedo",
-            Self::RgbTrue => "RGB, true light",
-            Self::RgbFitted => "RGB, fitted light",
-            Self::RgbRelit => "RGB, relit",
-            Self::Roughness => "Roughness",
-            Self::Metallic => "Metallic",
-            Self::TextureBaseColor => "Base colour texels",
-        }
-    }
-
     /// The map that it shows; none for light, which comes from all of them.
     pub const fn map(self) -> Option<Map> {
         match self {

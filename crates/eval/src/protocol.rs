@@ -65,7 +65,7 @@ impl Protocol {
             "paper" => {
                 let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
                 // Its numbers lie near 22 dB: a few plain samples are enough.
-                light.samples = SampleRules { at_320x240: 16, least: 16, most: 16, ..light.samples };
+                light.samples.fix(16);
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
             _ => return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES }),
@@ -87,14 +87,11 @@ impl Protocol {
     /// Fails if this scorer cannot score under the protocol: it is of another version, or its code holds other
     /// constants.
     pub fn check(&self) -> Result<(), EvalError> {
-        let protocol = || self.name.clone();
-        if self.scorer_version != SCORER_VERSION {
-            let (expected, found) = (SCORER_VERSION, self.scorer_version);
-            return Err(EvalError::ScorerVersion { protocol: protocol(), expected, found });
-        }
-        match self.fixed.first_difference(&FixedRules::of_this_scorer()) {
+        let versions = [self.scorer_version, SCORER_VERSION].map(|version| version.to_string());
+        let of_version = (versions[0] != versions[1]).then(|| ("scorer_version".to_owned(), versions));
+        match of_version.or_else(|| self.fixed.first_difference(&FixedRules::of_this_scorer())) {
             Some((rule, [found, expected])) => {
-                Err(EvalError::FixedRule { protocol: protocol(), rule, expected, found })
+                Err(EvalError::OtherRule { protocol: self.name.clone(), rule, expected, found })
             }
             None => Ok(()),
         }
@@ -198,6 +195,11 @@ pub struct SampleRules {
 }
 
 impl SampleRules {
+    /// Sets one number of samples of each half for views of every size.
+    pub fn fix(&mut self, each_half: u32) {
+        (self.at_320x240, self.least, self.most) = (each_half, each_half, each_half);
+    }
+
     /// Samples per pixel of each half of views of `pixels` pixels.
     pub fn each_half(&self, pixels: u64) -> u32 {
         let exact = f64::from(self.at_320x240) * (320.0 * 240.0) / pixels.max(1) as f64;

@@ -50,23 +50,6 @@ pub struct ResultFile {
     pub findings: Vec<Finding>,
 }
 
-impl ResultFile {
-    /// The method's name in tables and on boards, with the geometry that it was given, as in `nn (pose 2)`.
-    pub fn shown_method(&self) -> String {
-        match &self.submission.geometry {
-            None => self.method.clone(),
-            Some(perturbation) => format!("{} ({perturbation})", self.method),
-        }
-    }
-
-    /// The fingerprint that these of its scores would have if these scenes had been scored; without scenes, a hash of
-    /// everything else that scores depend on.
-    pub fn basis(&self, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
-        let weights = self.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
-        scores.protocol.fingerprint(&self.dataset.manifest_sha256, scenes, weights)
-    }
-}
-
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionId {

@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::light::difference::base_color_ratio;
-use crate::light::error::LightMse;
 use crate::light::lighting::LightingName;
+use crate::light::mse::LightMse;
 use crate::light::reference::StoredReference;
 use crate::metric::PictureKind;
 use crate::open_scene::ViewSet;

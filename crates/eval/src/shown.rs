@@ -13,7 +13,7 @@ use mateval_submission::prediction::{PredictedScene, read_scene};
 use crate::error::EvalError;
 use crate::light::lighting::LightingName;
 use crate::light::reference::StoredReference;
-use crate::light::score::compare_light;
+use crate::light::score::compare_under_lights;
 use crate::materials::pictures::material_pictures;
 use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::protocol::{Protocol, Track};
@@ -97,10 +97,10 @@ pub fn scene_light(
     // By view, and by submission and view: submissions arrive in any order.
     let mut references = Vec::new();
     let mut predicted: BTreeMap<usize, Vec<Picture<SrgbRgb>>> = BTreeMap::new();
-    compare_light(&task, &truths, &base_colors, protocol, &mut |submission, light| {
+    compare_under_lights(&task, &truths, &base_colors, protocol, &mut |submission, light| {
         if Some(light.track) == track && light.lighting == lighting {
             if references.is_empty() {
-                references = light.references.iter().map(|reference| reference.picture.clone()).collect();
+                references = light.references.iter().map(|reference| reference.encoded.clone()).collect();
             }
             predicted.insert(submission, light.views.into_iter().map(|view| view.shown).collect());
         }

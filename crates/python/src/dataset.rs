@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open;
-use mateval_eval::protocol::{Protocol, SampleRules};
+use mateval_eval::protocol::Protocol;
 use mateval_eval::shown::scene_light;
 use mateval_image::SrgbRgb;
 use mateval_image::transfer::byte_from_unit;
@@ -266,8 +266,7 @@ pub fn render<'py>(
         return Err(PyValueError::new_err(format!("samples: expected 1 to 4096, found {samples}")));
     }
     let mut protocol = Protocol::named("mateval-3").map_err(failed)?;
-    protocol.light.samples =
-        SampleRules { at_320x240: samples, least: samples, most: samples, ..protocol.light.samples };
+    protocol.light.samples.fix(samples);
     let listener = Listener::of(py, progress)?;
     let source = Arc::clone(&scene.source);
     let views = run_long(py, &listener, move |progress| {

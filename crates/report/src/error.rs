@@ -4,6 +4,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::titles::shown_method;
 use mateval_dataset::dataset::DatasetVersion;
 use mateval_dataset::{DatasetError, Finding, SceneId, Severity};
 use mateval_eval::EvalError;
@@ -218,7 +219,7 @@ impl fmt::Display for SubmissionVersion {
 impl Mismatch {
     /// The reason for which a result has no scores under a protocol, if it has none.
     pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
-        let method = result.shown_method();
+        let method = shown_method(result);
         let scored = || result.protocols.keys().cloned().collect();
         let is_scored = result.protocols.contains_key(protocol);
         (!is_scored).then(|| Self::Protocol { method, protocol: protocol.to_owned(), scored: scored() })

@@ -18,5 +18,6 @@ pub mod release;
 pub mod rounded;
 pub mod strips;
 pub mod tables;
+mod titles;
 
 pub use error::ReportError;

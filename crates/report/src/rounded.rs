@@ -12,6 +12,8 @@ use mateval_eval::result::{ProtocolResult, ResultFile};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::titles::shown_method;
+
 pub const ROUNDED_FORMAT: &str = "mateval-rounded/1";
 
 /// A rounded result.
@@ -47,7 +49,7 @@ impl RoundedFile {
         Self {
             format: ROUNDED_FORMAT.to_owned(),
             tool: result.tool.clone(),
-            method: result.shown_method(),
+            method: shown_method(result),
             submission_sha256: result.submission.sha256.clone(),
             dataset: result.dataset.named(),
             scenes: result.dataset.scenes.len(),

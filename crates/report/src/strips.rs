@@ -7,7 +7,7 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, Report, SceneId};
 use mateval_eval::metric::PictureKind;
-use mateval_eval::protocol::{Protocol, SampleRules, Track};
+use mateval_eval::protocol::{Protocol, Track};
 use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
 use mateval_files::FileError;
@@ -134,8 +134,7 @@ pub(crate) fn rows(
         Shown::Light { track, samples } => {
             let mut protocol = Protocol::named(if track == Track::Fitted { "paper" } else { "mateval-3" })?;
             protocol.light.tracks = vec![track];
-            protocol.light.samples =
-                SampleRules { at_320x240: samples, least: samples, most: samples, ..protocol.light.samples };
+            protocol.light.samples.fix(samples);
             let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, None, progress)?;
             Ok(views.into_iter().map(light_row).collect())
         }

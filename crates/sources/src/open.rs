@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::DatasetError;
 use mateval_dataset::gltf_file::GltfError;
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
@@ -12,6 +13,9 @@ use mateval_files::source_folder::SourceFolder;
 pub enum SourceError {
     #[error(transparent)]
     Files(#[from] FileError),
+    /// What Blender has made of its own file cannot be read.
+    #[error(transparent)]
+    Baked(#[from] DatasetError),
     /// The content of a file is not that of a source, or exceeds a limit.
     #[error("'{}': {what}", path.display())]
     Invalid {

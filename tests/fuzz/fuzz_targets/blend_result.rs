@@ -3,10 +3,8 @@
 //! input they follow each other, with two lengths of four bytes in front.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_dataset::SourceKind;
-use mateval_prep::blender::bake::Baked;
+use mateval_sources::blend::Baked;
 use mateval_sources::gltf::{Limits, read};
-use mateval_sources::source_scene::{Missing, SourceScene};
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((lengths, rest)) = bytes.split_at_checked(8) else { return };
@@ -21,25 +19,7 @@ fuzz_target!(|bytes: &[u8]| {
         let path = out.join("scene.glb");
         std::fs::write(&path, glb).expect("there is room for a small file");
         std::fs::write(out.join("world.exr"), world).expect("there is room for a small file");
-        let Ok(scene) = read(&path, None, &limits) else { return };
-        let Some(camera) = scene.camera else { return };
-        let mut scene = SourceScene {
-            kind: SourceKind::Blend,
-            lights: scene.lights,
-            states_roughness: true,
-            states_metallic: true,
-            house: String::new(),
-            file: String::new(),
-            scene: scene.scene,
-            origins: scene.origins,
-            camera,
-            shift_m: scene.shift_m,
-            findings: scene.findings,
-            licence: None,
-            files: Vec::new(),
-            absent: Vec::new(),
-            missing: Missing::default(),
-        };
+        let Ok(mut scene) = read(&path, None, &limits) else { return };
         if baked.complete(&mut scene, &out).is_ok() {
             assert_eq!(scene.scene.surfaces.len(), scene.origins.len());
             assert!(scene.scene.surfaces.iter().all(|surface| surface.material.0 < scene.scene.materials.len()));

@@ -189,7 +189,7 @@ mod tests {
     use mateval_metrics::mse;
     use mateval_testkit::statistics::{Render, SCATTERS, Scatter, mean_and_deviation, waves};
 
-    use crate::light::error::LightMse;
+    use crate::light::mse::LightMse;
 
     use super::*;
 

@@ -24,7 +24,7 @@ use mateval_tracer::Lighting;
 
 use crate::error::EvalError;
 use crate::light::difference::{encoded, mean_of};
-use crate::light::paths::Paths;
+use crate::light::shared_paths::SharedPaths;
 use crate::open_scene::{OpenScene, ViewSet};
 use crate::protocol::Protocol;
 use crate::truth::{sized, true_maps};
@@ -112,7 +112,7 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
             continue;
         }
         let pass = set.pass("reference");
-        let paths = Paths { scene: &scene.id, world: &world, atlases: &atlases, rules, pass, progress };
+        let paths = SharedPaths { scene: &scene.id, world: &world, atlases: &atlases, rules, pass, progress };
         let repaint = paths.repaint(&[&truth], None)?;
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
         let half = |stream| paths.trace(&repaint, Lighting::Apart, &cameras, samples, stream);
@@ -267,7 +267,7 @@ mod tests {
         let (dataset, scene) = (dataset(), room(dataset()));
         let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene).unwrap();
         let rules = Protocol::named("mateval-3").unwrap().light;
-        let paths = Paths {
+        let paths = SharedPaths {
             scene: &scene.id,
             world: &world,
             atlases: &atlases,

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::LightDifference;
-use crate::light::error::{LightMse, mean_psnr_error};
-use crate::light::fitted::score_fitted;
-use crate::light::predictions::{Each, LitPicture, score_own};
+use crate::light::fitted_lights::compare_under_fitted_lights;
+use crate::light::mse::{LightMse, mean_psnr_error};
+use crate::light::own_lights::{LitSink, LitViews, compare_under_own_lights};
 use crate::materials::score::measure_whole_view;
 use crate::metric::{EncodedPair, Metric, PictureKind};
 use crate::protocol::{Protocol, Track};
@@ -29,24 +29,24 @@ pub(crate) fn score_light(
 ) -> Result<(), EvalError> {
     let protocol = &task.protocols[at];
     let meter = LightMeter::new(task, truths, protocol);
-    let mut each = |submission: usize, picture: LitPicture| meter.measure(&picture, &mut sheets[submission][at]);
-    compare_light(task, truths, base_colors, protocol, &mut each)
+    let mut each = |submission: usize, lit: LitViews| meter.measure(&lit, &mut sheets[submission][at]);
+    compare_under_lights(task, truths, base_colors, protocol, &mut each)
 }
 
 /// Renders every submission under each light of the protocol whose reference the dataset holds, and passes it on.
-pub(crate) fn compare_light(
+pub(crate) fn compare_under_lights(
     task: &SceneTask<'_>,
     truths: &[ViewTruth],
     base_colors: &BaseColors,
     protocol: &Protocol,
-    each: &mut Each<'_>,
+    each: &mut LitSink<'_>,
 ) -> Result<(), EvalError> {
     let tracks = &protocol.light.tracks;
     if let Some(reference) = task.reference.filter(|_| tracks.contains(&Track::True)) {
-        score_own(task, reference, truths, base_colors, protocol, each)?;
+        compare_under_own_lights(task, reference, truths, base_colors, protocol, each)?;
     }
     if let Some(renderer) = task.renderer.filter(|_| tracks.contains(&Track::Fitted)) {
-        score_fitted(task, renderer, truths, base_colors, protocol, each)?;
+        compare_under_fitted_lights(task, renderer, truths, base_colors, protocol, each)?;
     }
     Ok(())
 }
@@ -66,8 +66,8 @@ impl<'a> LightMeter<'a> {
         Self { task, protocol, truths, regions: truths.iter().map(regions).collect(), blocks }
     }
 
-    fn measure(&self, picture: &LitPicture<'_>, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
-        let kind = picture.track.picture();
+    fn measure(&self, lit: &LitViews<'_>, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
+        let kind = lit.track.picture();
         // Relit light has no specular regions of its own.
         let is_wanted = |region: &&MaskedRegion| match region.surfaces {
             Surfaces::All => true,
@@ -76,18 +76,17 @@ impl<'a> LightMeter<'a> {
         let jobs: Vec<(usize, &MaskedRegion)> = (0..self.regions.len())
             .flat_map(|view| self.regions[view].iter().filter(is_wanted).map(move |region| (view, region)))
             .collect();
-        let measured: Vec<_> =
-            jobs.par_iter().map(|&(view, region)| self.values(picture, kind, view, region)).collect();
+        let measured: Vec<_> = jobs.par_iter().map(|&(view, region)| self.values(lit, kind, view, region)).collect();
         for (&(view, _), measured) in jobs.iter().zip(measured) {
             let view = self.task.views[view];
             let (values, mse) = self.task.locate_error(view, measured)?;
             sheet.light_errors.entry(values.key(Metric::Psnr)).or_default().extend(mse);
             sheet.score.pictures.push(values);
         }
-        sheet.score.fit = picture.fit.clone().or(sheet.score.fit.take());
-        sheet.score.not_finite += picture.not_finite;
-        if picture.track != Track::Relit {
-            self.add_instance_errors(kind, &picture.views, sheet);
+        sheet.score.fit = lit.fit.clone().or(sheet.score.fit.take());
+        sheet.score.not_finite += lit.not_finite;
+        if lit.track != Track::Relit {
+            self.add_instance_errors(kind, &lit.views, sheet);
         }
         Ok(())
     }
@@ -95,19 +94,19 @@ impl<'a> LightMeter<'a> {
     /// The values of one region of a view, and its error with the noise by block.
     fn values(
         &self,
-        picture: &LitPicture<'_>,
+        lit: &LitViews<'_>,
         kind: PictureKind,
         view: usize,
         region: &MaskedRegion,
     ) -> Result<(PictureValues, Option<LightMse>), MetricError> {
-        let (found, blocks) = (&picture.views[view], &self.blocks[view]);
+        let (found, blocks) = (&lit.views[view], &self.blocks[view]);
         let mut mse = LightMse::new(found, &region.mask, blocks)?;
-        if let (Some(mse), Some(fits)) = (&mut mse, &picture.of_fits) {
+        if let (Some(mse), Some(fits)) = (&mut mse, &lit.of_fits) {
             let [a, b] = fits.each_ref().map(|fit| LightMse::new(&fit[view], &region.mask, blocks));
             mse.common = a?.zip(b?).map_or(0.0, |(a, b)| (a.mse - b.mse) / 2.0);
         }
         let scene: &SceneId = &self.task.scene.id;
-        let mut values = region.values(scene, &self.task.views[view].id, kind, picture.lighting);
+        let mut values = region.values(scene, &self.task.views[view].id, kind, lit.lighting);
         if let Some(mse) = &mse {
             let Psnr { db, exact } = mse.psnr()?;
             values.values.extend([(Metric::Mse, mse.mse), (Metric::Psnr, db)]);
@@ -115,11 +114,9 @@ impl<'a> LightMeter<'a> {
             (values.exact, values.lower_bound) = (exact, mse.is_lower_bound());
         }
         if region.is_whole() && mse.is_some() {
-            let reference = &picture.references[view];
             let pair = EncodedPair {
                 prediction: &found.shown,
-                reference: &reference.picture,
-                features: &reference.features,
+                reference: &lit.references[view],
                 mask: &region.mask,
                 mask_rule: self.protocol.mask_rule,
                 lpips: self.task.lpips,

@@ -3,9 +3,8 @@
 
 use mateval_dataset::Report;
 use mateval_dataset::dataset::View;
-use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
+use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::alignment::{channel_scales, scaled};
-use mateval_metrics::mask_rule::ReferenceFeatures;
 use mateval_metrics::{Lpips, MetricError, Psnr, mse};
 use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
@@ -13,7 +12,7 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::materials::pictures::{MaterialPictures, material_pictures};
 use crate::materials::texels::texture_space;
-use crate::metric::{EncodedPair, HALF_A_BYTE, Measure, Metric, PictureKind, Stated};
+use crate::metric::{ColorPicture, EncodedPair, HALF_A_BYTE, Measure, Metric, PictureKind, Stated};
 use crate::protocol::{AlbedoSpace, Protocol};
 use crate::result::PictureValues;
 use crate::result::key::Surfaces;
@@ -23,15 +22,17 @@ use crate::truth::{ViewTruth, true_maps};
 struct Predicted {
     pictures: MaterialPictures,
     /// The base colour as it is, and scaled by [`channel_scales`].
-    albedos: [(PictureKind, Albedo); 2],
+    albedos: [(PictureKind, ColorPicture); 2],
 }
 
 impl Predicted {
     fn new(pictures: MaterialPictures, truth: &ViewTruth) -> Self {
         let raw = &pictures.base_color;
         let aligned = scaled(raw, channel_scales(raw, &truth.albedo, &truth.valid));
-        let albedos =
-            [(PictureKind::Albedo, Albedo::new(raw.clone())), (PictureKind::AlbedoAligned, Albedo::new(aligned))];
+        let albedos = [
+            (PictureKind::Albedo, ColorPicture::new(raw.clone())),
+            (PictureKind::AlbedoAligned, ColorPicture::new(aligned)),
+        ];
         Self { pictures, albedos }
     }
 }
@@ -39,7 +40,7 @@ impl Predicted {
 /// The truth of a view, and what is shared between submissions and protocols.
 struct Truth<'a> {
     view: &'a ViewTruth,
-    albedo: AlbedoReference,
+    albedo: ColorPicture,
     regions: Vec<MaskedRegion>,
 }
 
@@ -64,8 +65,7 @@ impl SceneTask<'_> {
             let truth = &truths[at];
             let predicted: Vec<Predicted> =
                 pictures.par_iter().map(|pictures| Predicted::new(pictures.clone(), truth)).collect();
-            let albedo = AlbedoReference::new(truth.albedo.clone());
-            let truth = Truth { view: truth, albedo, regions: regions(truth) };
+            let truth = Truth { view: truth, albedo: ColorPicture::new(truth.albedo.clone()), regions: regions(truth) };
             let protocols = (0..self.protocols.len()).filter(|&p| wanted(p));
             let jobs: Vec<(usize, usize)> = protocols.flat_map(|p| (0..sheets.len()).map(move |s| (s, p))).collect();
             let measured: Vec<_> = jobs
@@ -151,7 +151,7 @@ impl SceneTask<'_> {
         errors: &mut InstanceErrors,
     ) {
         for (kind, albedo) in &predicted.albedos {
-            let (of, reference) = (albedo, &truth.albedo.albedo);
+            let (of, reference) = (albedo, &truth.albedo);
             let error = |k: usize| match protocol.albedo_space {
                 AlbedoSpace::Linear => mean_square(of.linear.pixels()[k].0, reference.linear.pixels()[k].0),
                 AlbedoSpace::Srgb => mean_square(of.encoded.pixels()[k].0, reference.encoded.pixels()[k].0),
@@ -184,52 +184,25 @@ fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
 }
 
-/// An albedo picture, linear and as SSIM and LPIPS see it.
-pub struct Albedo {
-    pub linear: Picture<LinearRgb>,
-    /// Clipped to 0..1 and encoded.
-    pub encoded: Picture<SrgbRgb>,
-}
-
-/// A true albedo picture, with what LPIPS compares of it.
-pub struct AlbedoReference {
-    pub albedo: Albedo,
-    features: ReferenceFeatures,
-}
-
-impl Albedo {
-    pub fn new(linear: Picture<LinearRgb>) -> Self {
-        Self { encoded: linear.to_srgb(), linear }
-    }
-}
-
-impl AlbedoReference {
-    pub fn new(linear: Picture<LinearRgb>) -> Self {
-        Self { albedo: Albedo::new(linear), features: ReferenceFeatures::default() }
-    }
-}
-
 /// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also the metrics of whole
 /// views.
 pub fn measure_albedo(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
-    prediction: &Albedo,
-    reference: &AlbedoReference,
+    prediction: &ColorPicture,
+    reference: &ColorPicture,
     mask: &Mask,
     whole: bool,
     values: &mut PictureValues,
 ) -> Result<(), MetricError> {
-    let AlbedoReference { albedo: truth, features } = reference;
-    let Some(error) = albedo_mse(protocol, prediction, truth, mask)? else { return Ok(()) };
+    let Some(error) = albedo_mse(protocol, prediction, reference, mask)? else { return Ok(()) };
     let Psnr { db, exact } = Psnr::from_mse(error)?;
     values.values.extend([(Metric::Mse, error), (Metric::Psnr, db)]);
     values.exact = exact;
     if whole {
-        let linear = Some([&prediction.linear, &truth.linear]);
-        let (prediction, reference, mask_rule) = (&prediction.encoded, &truth.encoded, protocol.mask_rule);
-        let pair = EncodedPair { prediction, reference, features, mask, mask_rule, lpips };
-        measure_whole_view(protocol, linear, &pair, values)?;
+        let mask_rule = protocol.mask_rule;
+        let pair = EncodedPair { prediction: &prediction.encoded, reference, mask, mask_rule, lpips };
+        measure_whole_view(protocol, Some(&prediction.linear), &pair, values)?;
     }
     Ok(())
 }
@@ -237,8 +210,8 @@ pub fn measure_albedo(
 /// MSE of an albedo picture over the mask, in the protocol's space; absent if no pixel counts.
 pub fn albedo_mse(
     protocol: &Protocol,
-    prediction: &Albedo,
-    reference: &Albedo,
+    prediction: &ColorPicture,
+    reference: &ColorPicture,
     mask: &Mask,
 ) -> Result<Option<f64>, MetricError> {
     match protocol.albedo_space {
@@ -247,17 +220,17 @@ pub fn albedo_mse(
     }
 }
 
-/// Adds the metrics of whole views that the picture's kind has. Renders have no linear pictures.
+/// Adds the metrics of whole views that the picture's kind has. Renders have no linear prediction.
 pub(crate) fn measure_whole_view(
     protocol: &Protocol,
-    linear: Option<[&Picture<LinearRgb>; 2]>,
+    linear: Option<&Picture<LinearRgb>>,
     pair: &EncodedPair<'_>,
     values: &mut PictureValues,
 ) -> Result<(), MetricError> {
     for metric in Metric::of(values.picture.kind) {
         let value = match (&metric.row().measure, linear) {
             (Measure::Encoded(measure), _) => measure(pair)?,
-            (Measure::Linear(measure), Some([prediction, reference])) => measure(prediction, reference, pair.mask)?,
+            (Measure::Linear(measure), Some(linear)) => measure(linear, &pair.reference.linear, pair.mask)?,
             _ => None,
         };
         let steps = 10_f64.powi(protocol.rounded_decimals as i32);
@@ -321,7 +294,7 @@ mod tests {
         reference: &Picture<LinearRgb>,
         mask: &Mask,
     ) -> PictureValues {
-        let (prediction, reference) = (Albedo::new(prediction.clone()), AlbedoReference::new(reference.clone()));
+        let [prediction, reference] = [prediction, reference].map(|picture| ColorPicture::new(picture.clone()));
         let mut values = blank(PictureKind::Albedo);
         measure_albedo(&Protocol::named(protocol).unwrap(), None, &prediction, &reference, mask, true, &mut values)
             .unwrap();

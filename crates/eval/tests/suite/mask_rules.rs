@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_eval::materials::score::{Albedo, AlbedoReference, measure_albedo};
-use mateval_eval::metric::Metric;
+use mateval_eval::materials::score::measure_albedo;
+use mateval_eval::metric::{ColorPicture, Metric};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::PictureValues;
 use mateval_image::{LinearRgb, Mask, Picture};
@@ -42,7 +42,7 @@ fn strips(columns: usize) -> [Mask; 2] {
 
 fn measured(rule: MaskRule, mask: &Mask, lpips: Option<&Lpips>) -> BTreeMap<Metric, f64> {
     let protocol = Protocol { mask_rule: rule, ..Protocol::named("mateval-3").unwrap() };
-    let (prediction, reference) = (Albedo::new(prediction()), AlbedoReference::new(reference()));
+    let (prediction, reference) = (ColorPicture::new(prediction()), ColorPicture::new(reference()));
     let mut values: PictureValues = serde_json::from_value(serde_json::json!({
         "scene": "s", "view": "input", "picture": "albedo", "region": "valid", "pixels": 1, "values": {},
     }))

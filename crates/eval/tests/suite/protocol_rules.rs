@@ -174,8 +174,7 @@ fn samples(protocol: &Protocol) -> Value {
 fn refusal(protocol: &Protocol) -> Value {
     match protocol.check() {
         Ok(()) => json!("accepted"),
-        Err(EvalError::FixedRule { rule, .. }) => json!(rule),
-        Err(EvalError::ScorerVersion { found, .. }) => json!(found),
+        Err(EvalError::OtherRule { rule, found, .. }) => json!([rule, found]),
         Err(other) => panic!("{other}"),
     }
 }

@@ -1,13 +1,10 @@
-//! Renders with Blender's Cycles, and has Blender [`bake`] its own files.
+//! Renders with Blender's Cycles.
 //!
 //! In: a reference scene, the parts of its instances, and views. Out: [`BlenderView`]s. Between: a job for
 //! `blender_scripts/render.py`, which is a folder with `job.json`, meshes as raw little-endian numbers and textures as
 //! linear EXR files; `process` copies the scripts into it, runs Blender and enforces limits; multi-layer EXR files hold
 //! the pictures of each view. Textures are decoded here, since Cycles interpolates 8-bit sRGB before it decodes it,
 //! while the built-in tracer decodes first.
-
-pub mod bake;
-mod process;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,12 +15,12 @@ use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json};
 use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture, Wrap};
+use mateval_sources::blend::process;
+pub use mateval_sources::blend::process::{BlenderLimits, BlenderProgram, Ended, tail};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::error::PrepError;
-use process::write_scripts;
-pub use process::{BlenderLimits, BlenderProgram, Ended, tail};
 
 /// A folder with a job that is ready to run.
 #[derive(Debug)]
@@ -47,7 +44,7 @@ impl JobFolder {
     pub fn prepare(folder: &Path, plan: &JobPlan<'_>) -> Result<Self, PrepError> {
         std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
         write_job(folder, plan)?;
-        let script = write_scripts(folder)?;
+        let script = process::write_scripts(folder)?;
         Ok(Self { folder: folder.to_owned(), script, groups: plan.reference.lights.len() })
     }
 

@@ -3,6 +3,7 @@
 use mateval_dataset::{Finding, Severity};
 use mateval_files::source_folder::FileFault;
 use mateval_image::ImageError;
+use mateval_sources::blend::BakeFault;
 use mateval_sources::front3d::camera_sampler::CameraError;
 
 use super::labels::LabelFault;
@@ -78,19 +79,6 @@ pub enum BuildFault {
     /// No drawn camera was accepted.
     #[error(transparent)]
     DrawnCamera(#[from] CameraError),
-}
-
-/// Why a `.blend` file was not baked.
-#[derive(Debug, thiserror::Error)]
-pub enum BakeFault {
-    #[error(
-        "a .blend file is read by Blender, and none was found; install it with `mateval fetch blender`, or name it with --blender"
-    )]
-    NoBlender,
-    #[error("the .blend file is refused:{}", Finding::list(.0))]
-    Refused(Vec<Finding>),
-    #[error("Blender did not bake the file: {what}; its log ends with:\n{log}")]
-    Failed { what: String, log: String },
 }
 
 /// Why a photo cannot be the input picture.

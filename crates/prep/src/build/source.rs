@@ -13,14 +13,14 @@ use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Finding, Progress, Report, Severity, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
+use mateval_sources::blend::{BakeFault, bake};
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceScene};
 use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
-use super::fault::{BakeFault, BuildFault, above_notes};
-use crate::blender::bake::bake;
+use super::fault::{BuildFault, above_notes};
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::{InstanceId, SceneId};
-use mateval_eval::materials::score::{Albedo, albedo_mse};
-use mateval_eval::metric::PictureKind;
+use mateval_eval::materials::score::albedo_mse;
+use mateval_eval::metric::{ColorPicture, PictureKind};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::Views;
@@ -58,8 +58,8 @@ fn scores_with(by: AlignedBy, protocol: &Protocol, views: &[SceneAlbedo]) -> Res
     let scales = scales(by, views);
     let mut values: BTreeMap<Views, Vec<f64>> = BTreeMap::new();
     for (number, view) in views.iter().enumerate() {
-        let aligned = Albedo::new(aligned(by, &scales, number, view));
-        let truth = Albedo::new(view.truth.albedo.clone());
+        let aligned = ColorPicture::new(aligned(by, &scales, number, view));
+        let truth = ColorPicture::new(view.truth.albedo.clone());
         // Only the input view has no unobserved pixels.
         let whole = if view.truth.unobserved.is_none() { Views::Input } else { Views::Novel };
         let regions = [(whole, Some(&view.truth.valid)), (Views::Unobserved, view.truth.unobserved.as_ref())];

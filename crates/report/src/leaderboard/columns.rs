@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::file::LeaderboardMethod;
 use super::marks::Verified;
 use crate::ranking::file::{RankRange, RankedMethod, Ranking, Standing};
+use crate::titles::Titled;
 
 #[derive(Clone, Serialize)]
 pub(super) struct Column {

@@ -19,6 +19,7 @@ use super::columns::{Column, headlines};
 use super::entries::is_in_curves;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
+use crate::titles::Titled;
 
 /// Classes of the share of pixels that the input view does not show.
 const SHARES: u32 = 5;

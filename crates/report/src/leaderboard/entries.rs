@@ -22,6 +22,7 @@ use super::marks::{TrustedKeys, Verified, sidecar};
 use crate::error::{ReportError, fitting};
 use crate::ranking::file::Ranking;
 use crate::strips::Shown;
+use crate::titles::shown_method;
 
 /// The file of the truth's own result.
 const CEILING: &str = "ceiling.json";
@@ -148,11 +149,11 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
         entries.results.push(result);
         paths.push(path.as_path());
     }
-    if let Some(path) = &files.ceiling {
-        if let Some(result) = read_result(path, &mut findings)? {
-            findings.extend(not_the_truth(path, &result, trust));
-            entries.ceiling = Some(result);
-        }
+    if let Some(path) = &files.ceiling
+        && let Some(result) = read_result(path, &mut findings)?
+    {
+        findings.extend(not_the_truth(path, &result, trust));
+        entries.ceiling = Some(result);
     }
     if let Some(path) = &files.errata {
         entries.errata = fitting(ErrataFile::read(path), "errata", path, UNFIT, &mut findings)?;
@@ -162,7 +163,7 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
         entries.about = Some(String::from_utf8_lossy(&bytes).into_owned());
     }
     let results = &entries.results;
-    let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
+    let shown: Vec<String> = results.iter().map(shown_method).collect();
     let names = shown.iter().map(|name| name.trim());
     findings.extend(repeated(&paths, names, "name", "/method", "give each method its own name, or leave one out"));
     if let (Some(errata), Some(path)) = (&entries.errata, &files.errata) {
@@ -268,7 +269,7 @@ fn not_the_truth(path: &Path, result: &ResultFile, trust: &TrustedKeys) -> Optio
 
 /// A finding for each name in the errata that no result has: of no method, and of no scene.
 fn unknown_names(path: &Path, errata: &ErrataFile, results: &[ResultFile]) -> Vec<Finding> {
-    let methods: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
+    let methods: Vec<String> = results.iter().map(shown_method).collect();
     let scenes = results.iter().flat_map(|result| &result.dataset.scenes).map(SceneId::as_str);
     let known: BTreeSet<&str> = methods.iter().map(String::as_str).chain(scenes).collect();
     let mut findings = Vec::new();

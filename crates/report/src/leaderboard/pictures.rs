@@ -21,6 +21,7 @@ use super::entries::{LeaderboardPlan, Submissions};
 use crate::error::ReportError;
 use crate::ranking::file::{RankedMethod, Ranking};
 use crate::strips::{StripPlan, StripRow, errors, rows};
+use crate::titles::Titled;
 
 /// The folder of the truth's pictures; no id of a method begins with an underscore.
 pub(super) const TRUTH: &str = "_truth";

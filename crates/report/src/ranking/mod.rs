@@ -20,6 +20,7 @@ use self::bootstrap::{DrawTable, Draws};
 use self::file::{LEVEL, RankedMethod, Ranking, RankingRules};
 use self::key_ranking::{KeyValues, rank_key};
 use crate::error::{Mismatch, ReportError};
+use crate::titles::shown_method;
 
 /// The number of draws of houses, unless the pairs of methods need more.
 const DRAWS: usize = 10_000;
@@ -84,8 +85,8 @@ fn methods(board: &Board<'_>, partial: bool) -> Vec<RankedMethod> {
         let scored = &entrant.result.dataset.scenes;
         let not_scored: Vec<SceneId> = board.scenes.iter().filter(|scene| !scored.contains(scene)).cloned().collect();
         RankedMethod {
-            id: unused_id(&entrant.result.shown_method(), &mut ids),
-            method: entrant.result.shown_method(),
+            id: unused_id(&shown_method(entrant.result), &mut ids),
+            method: shown_method(entrant.result),
             submission_sha256: entrant.result.submission.sha256.clone(),
             partial: partial && !(not_scored.is_empty() && entrant.left_out.is_empty()),
             not_scored,
@@ -147,13 +148,19 @@ impl<'a> Entrant<'a> {
     }
 
     fn name(&self) -> String {
-        self.result.shown_method()
+        shown_method(self.result)
     }
 
-    /// See [`ResultFile::basis`].
     fn basis(&self, scenes: &[&SceneId]) -> String {
-        self.result.basis(self.scores, scenes)
+        basis(self.result, self.scores, scenes)
     }
+}
+
+/// The fingerprint that these scores of a result would have if these scenes had been scored; without scenes, a hash of
+/// everything else that scores depend on.
+pub(crate) fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&SceneId]) -> String {
+    let weights = result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_deref);
+    scores.protocol.fingerprint(&result.dataset.manifest_sha256, scenes, weights)
 }
 
 struct Board<'a> {

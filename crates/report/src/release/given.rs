@@ -17,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{ReportError, fitting};
+use crate::ranking::basis;
 
 /// All states, in the order in which they are counted.
 const STATES: [State; 6] =
@@ -227,7 +228,7 @@ pub fn read_bounds(
     let [first, second] = [ceiling, floor].map(|path| path.map(|path| result(path, protocol, dataset, &mut findings)));
     let (first, second) = (first.transpose()?.flatten(), second.transpose()?.flatten());
     if let (Some(first), Some((result, scores)), Some(path)) = (&first, &second, floor)
-        && first.0.basis(&first.1, &[]) != result.basis(scores, &[])
+        && basis(&first.0, &first.1, &[]) != basis(result, scores, &[])
     {
         let message = "its rules, scorer or LPIPS weights are not those of the ceiling".to_owned();
         findings.push(unfit(path, &format!("/protocols/{protocol}/fingerprint"), message));
@@ -281,7 +282,7 @@ fn unknown_scenes(path: &Path, result: &ResultFile, dataset: &Dataset) -> Option
 
 /// A finding if the fingerprint does not follow from the rest of the result.
 fn changed(path: &Path, result: &ResultFile, protocol: &str, scores: &ProtocolResult) -> Option<Finding> {
-    let found = result.basis(scores, &result.dataset.scenes.iter().collect::<Vec<_>>());
+    let found = basis(result, scores, &result.dataset.scenes.iter().collect::<Vec<_>>());
     let place = format!("/protocols/{protocol}/fingerprint");
     let message = || format!("does not follow from protocol, dataset, scenes and weights, which give {found}");
     (found != scores.fingerprint).then(|| unfit(path, &place, message()))

@@ -3,6 +3,8 @@
 use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 
+use crate::titles::Titled;
+
 /// How the rows of a table are grouped; every group has one row for each method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grouping {

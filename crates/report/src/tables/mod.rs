@@ -16,6 +16,7 @@ pub(crate) use layouts::{BlockWords, CellKey, PAPER, TableWords, Value};
 pub(crate) use table::pooled;
 
 use crate::error::{Mismatch, ReportError};
+use crate::titles::shown_method;
 use mateval_eval::result::ResultFile;
 
 /// How a table is written.
@@ -99,7 +100,7 @@ fn check_comparable(results: &[ResultFile], ceiling: Option<&ResultFile>, protoc
     let mut mismatches = Vec::new();
     for result in results.iter().chain(ceiling) {
         let of_result = Mismatch::of_result(result, protocol);
-        let (first_name, other) = (first.shown_method(), result.shown_method());
+        let (first_name, other) = (shown_method(first), shown_method(result));
         if of_result.is_none() && fingerprint(first).is_some_and(|first| Some(first) != fingerprint(result)) {
             mismatches.push(Mismatch::Fingerprints { first: first_name.clone(), other: other.clone() });
         }

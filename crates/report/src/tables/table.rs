@@ -9,6 +9,7 @@ use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
 use mateval_metrics::Psnr;
 
 use super::layouts::{CellKey, Grouping, Layout, Quantity, Value};
+use crate::titles::shown_method;
 
 /// One method's numbers.
 pub(super) struct Row {
@@ -47,7 +48,7 @@ pub(super) fn groups(
         all.filter_map(|result| Some((result, result.protocols.get(protocol)?))).collect();
     let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<CellKey, Value>| {
         let row = |(at, (result, scores)): (usize, &(&ResultFile, &ProtocolResult))| Row {
-            method: result.shown_method(),
+            method: shown_method(result),
             values: values(at, scores),
             not_predicted: result.not_predicted.clone(),
         };

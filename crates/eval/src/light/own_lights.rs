@@ -1,9 +1,8 @@
 //! Predictions under the scene's own emitters, compared with R.
 
 use mateval_dataset::Camera;
-use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
+use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_light::light_fit::FittedRadiances;
-use mateval_metrics::mask_rule::ReferenceFeatures;
 use mateval_tracer::noise_filter::Surfaces;
 use mateval_tracer::{LightMix, ViewsRender, World};
 use rayon::prelude::*;
@@ -11,18 +10,19 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, ViewGuide, corrected_quarter, difference};
 use crate::light::lighting::{LightingName, group_shares, light_of, lightings};
-use crate::light::paths::{Paths, QUARTERS, ViewQuarters, batches, picture_of};
 use crate::light::reference::{StoredReference, weighted};
+use crate::light::shared_paths::{QUARTERS, SharedPaths, ViewQuarters, batches, picture_of};
+use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
 use crate::truth::{ViewTruth, true_maps};
 
-/// A prediction under one light, compared with the reference.
-pub(crate) struct LitPicture<'a> {
+/// The views of a prediction under one light, compared with the reference.
+pub(crate) struct LitViews<'a> {
     pub(crate) track: Track,
     pub(crate) lighting: Option<LightingName>,
     /// What it is compared with, by view.
-    pub(crate) references: &'a [EncodedReference],
+    pub(crate) references: &'a [ColorPicture],
     pub(crate) views: Vec<LightDifference>,
     /// For fitted lights, the views under the lights of each of two fits.
     pub(crate) of_fits: Option<[Vec<LightDifference>; 2]>,
@@ -31,39 +31,26 @@ pub(crate) struct LitPicture<'a> {
     pub(crate) not_finite: u64,
 }
 
-/// A reference picture, within 0..1 and encoded, with what LPIPS compares of it.
-pub(crate) struct EncodedReference {
-    pub(crate) picture: Picture<SrgbRgb>,
-    pub(crate) features: ReferenceFeatures,
-}
-
-impl EncodedReference {
-    pub(crate) fn new(exposed: &Picture<LinearRgb>) -> Self {
-        Self { picture: exposed.to_srgb(), features: ReferenceFeatures::default() }
-    }
-}
-
-/// Passes a prediction's picture on, with its number.
-pub(crate) type Each<'a> = dyn FnMut(usize, LitPicture<'_>) -> Result<(), EvalError> + 'a;
+/// Takes the views of a prediction, by its number.
+pub(crate) type LitSink<'a> = dyn FnMut(usize, LitViews<'_>) -> Result<(), EvalError> + 'a;
 
 struct OwnLighting {
     track: Track,
     name: Option<LightingName>,
     mix: LightMix,
     /// R by view, exposed.
-    references: Vec<Picture<LinearRgb>>,
-    encoded: Vec<EncodedReference>,
+    references: Vec<ColorPicture>,
 }
 
 /// Renders every submission together with the truth under the scene's own emitters, in every lighting of the protocol,
 /// and compares it with R.
-pub(super) fn score_own(
+pub(super) fn compare_under_own_lights(
     task: &SceneTask<'_>,
     reference: &StoredReference,
     truths: &[ViewTruth],
     base_colors: &BaseColors,
     protocol: &Protocol,
-    each: &mut Each<'_>,
+    each: &mut LitSink<'_>,
 ) -> Result<(), EvalError> {
     let rules = &protocol.light;
     let (lightings, group_light) = own_lightings(task, reference, protocol)?;
@@ -71,22 +58,22 @@ pub(super) fn score_own(
     let input = task.input_view()?;
     let world: World = task.world.with_group_shares(&input.camera, &group_shares(&mixes, &group_light));
     let (scene, atlases, progress) = (&task.scene.id, task.atlases, task.progress);
-    let paths = Paths { scene, world: &world, atlases, rules, pass: task.set.pass("own"), progress };
+    let paths = SharedPaths { scene, world: &world, atlases, rules, pass: task.set.pass("own"), progress };
     let truth = true_maps(task.folder, task.scene)?;
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
     let samples = rules.samples.each_half(task.pixels().next().unwrap_or(0));
     // A batch holds a render and four quarters of every prediction.
     let bytes = 5 * (lightings.len() as u64) * task.pixels().sum::<u64>() * size_of::<LinearRgb>() as u64;
     let mut compare = |index, ratios: &[_], lighting: &OwnLighting, quarters: ViewQuarters, not_finite| {
-        let guides = Guides { truths, ratios, references: &lighting.references };
+        let guides = ViewGuides { truths, ratios, references: &lighting.references };
         if let Some(kept) = task.pictures {
             for (at, (view, quarters)) in task.views.iter().zip(&quarters).enumerate() {
                 kept.keep_light(index, (scene, &view.id), lighting.name, quarters, &guides.of(at))?;
             }
         }
-        let OwnLighting { track, name, encoded, .. } = lighting;
+        let OwnLighting { track, name, references, .. } = lighting;
         let (track, lighting, views) = (*track, *name, guides.differences(quarters));
-        each(index, LitPicture { track, lighting, references: encoded, views, of_fits: None, fit: None, not_finite })
+        each(index, LitViews { track, lighting, references, views, of_fits: None, fit: None, not_finite })
     };
     // Where a prediction is the truth texel by texel, every m is R (see `difference`), so no path is traced.
     let is_truth = |&index: &usize| task.predictions[index].materials == truth.materials;
@@ -94,7 +81,7 @@ pub(super) fn score_own(
     for index in exact {
         let ratios = base_colors.ratios(index);
         for lighting in &lightings {
-            let quarters = lighting.references.iter().map(|reference| vec![reference.clone(); QUARTERS.len()]);
+            let quarters = lighting.references.iter().map(|reference| vec![reference.linear.clone(); QUARTERS.len()]);
             compare(index, &ratios, lighting, quarters.collect(), 0)?;
         }
     }
@@ -106,7 +93,7 @@ pub(super) fn score_own(
         let corrected = |renders: &[ViewsRender], prediction: usize, lighting: usize, view: usize| {
             // The truth travels last.
             let [own, truth] = [prediction, batch.len()].map(|at| picture_of(&renders[at], view, lighting));
-            let (reference, ratio) = (&lightings[lighting].references[view], &ratios[prediction][view]);
+            let (reference, ratio) = (&lightings[lighting].references[view].linear, &ratios[prediction][view]);
             corrected_quarter(own, truth, task.scene.exposure, reference, ratio)
         };
         let (mut quarters, mut not_finite) =
@@ -145,7 +132,7 @@ fn own_lightings(
         let relit = lightings(&protocol.light.relit, &group_light);
         wanted.extend(relit.into_iter().map(|relit| (Track::Relit, Some(relit.name), relit.weights)));
     }
-    let blank = |(track, name, mix)| OwnLighting { track, name, mix, references: Vec::new(), encoded: Vec::new() };
+    let blank = |(track, name, mix)| OwnLighting { track, name, mix, references: Vec::new() };
     let mut all: Vec<OwnLighting> = wanted.into_iter().map(blank).collect();
     for view in &task.views {
         let groups = reference.groups(view)?;
@@ -153,27 +140,26 @@ fn own_lightings(
         for lighting in &mut all {
             let size = [k.width as usize, k.height as usize];
             let picture = weighted(&groups, &lighting.mix, task.scene.exposure, size);
-            lighting.encoded.push(EncodedReference::new(&picture));
-            lighting.references.push(picture);
+            lighting.references.push(ColorPicture::new(picture));
         }
     }
     Ok((all, group_light))
 }
 
 /// What is known of each view of a prediction in one lighting.
-pub(crate) struct Guides<'a> {
+pub(crate) struct ViewGuides<'a> {
     pub(crate) truths: &'a [ViewTruth],
     /// r.
     pub(crate) ratios: &'a [Picture<LinearRgb>],
     /// R, exposed.
-    pub(crate) references: &'a [Picture<LinearRgb>],
+    pub(crate) references: &'a [ColorPicture],
 }
 
-impl Guides<'_> {
+impl ViewGuides<'_> {
     pub(crate) fn of(&self, view: usize) -> ViewGuide<'_> {
         let ViewTruth { instances, normals, valid, .. } = &self.truths[view];
         let surfaces = Surfaces { base_color: None, instances, normals, valid };
-        ViewGuide { reference: &self.references[view], ratio: &self.ratios[view], surfaces }
+        ViewGuide { reference: &self.references[view].linear, ratio: &self.ratios[view], surfaces }
     }
 
     pub(crate) fn differences(&self, quarters: ViewQuarters) -> Vec<LightDifference> {

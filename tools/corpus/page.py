@@ -8,9 +8,9 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from corpus_run import RESOLUTION, Outcome, Result
+from run import RESOLUTION, Outcome, Result
 
-STYLE = Path(__file__).resolve().parent.parent / "crates/pages/src/style.css"
+STYLE = Path(__file__).resolve().parents[2] / "crates/pages/src/style.css"
 LOG_CHARACTERS = 20_000
 """How much of a log is shown, from its start and from its end."""
 

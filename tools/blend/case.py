@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "blender_scripts"
+SCRIPTS = Path(__file__).resolve().parents[2] / "blender_scripts"
 # Tests compare with functions of the scripts.
 sys.path.insert(0, str(SCRIPTS))
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
-from corpus_files import Case
+from files import Case
 
 RESOLUTION = (96, 72)
 SAMPLES = 4

@@ -15,26 +15,26 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, encoded, guided_mean, mean_of};
-use crate::light::paths::{Paths, batches, picture_of};
-use crate::light::predictions::{Each, EncodedReference, Guides, LitPicture};
+use crate::light::own_lights::{LitSink, LitViews, ViewGuides};
+use crate::light::shared_paths::{SharedPaths, batches, picture_of};
+use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
 use crate::truth::{ViewTruth, photo_of_renderer};
 
 /// Fits every submission's lights, renders it under them and compares it with the photo's renderer.
-pub(crate) fn score_fitted(
+pub(crate) fn compare_under_fitted_lights(
     task: &SceneTask<'_>,
     renderer: &RendererId,
     truths: &[ViewTruth],
     base_colors: &BaseColors,
     protocol: &Protocol,
-    each: &mut Each<'_>,
+    each: &mut LitSink<'_>,
 ) -> Result<(), EvalError> {
-    let lit = LitRoom::new(task, protocol)?;
+    let lit = FittedLights::new(task, protocol)?;
     let photos: Vec<Picture<LinearRgb>> =
         task.views.iter().map(|view| photo_of_renderer(task.folder, renderer, view)).collect::<Result<_, _>>()?;
-    let exposed_photos: Vec<Picture<LinearRgb>> = photos.iter().map(|photo| exposed(task, photo)).collect();
-    let references: Vec<EncodedReference> = exposed_photos.iter().map(EncodedReference::new).collect();
+    let references: Vec<ColorPicture> = photos.iter().map(|photo| ColorPicture::new(exposed(task, photo))).collect();
     let paths = lit.paths(task, protocol);
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
     let pixels = task.pixels().next().unwrap_or(0);
@@ -55,7 +55,7 @@ pub(crate) fn score_fitted(
         for (at, (&index, fit)) in batch.iter().zip(fits).enumerate() {
             let [first, second] = &quarters[at][..] else { unreachable!("two fits make two pictures") };
             let ratios = base_colors.ratios(index);
-            let guides = Guides { truths, ratios: &ratios, references: &exposed_photos };
+            let guides = ViewGuides { truths, ratios: &ratios, references: &references };
             // The first half under the first fit, the second under the second.
             let both: Vec<[&Picture<LinearRgb>; 4]> =
                 first.iter().zip(second).map(|(a, b)| [&a[0], &a[1], &b[2], &b[3]]).collect();
@@ -66,10 +66,7 @@ pub(crate) fn score_fitted(
             let of_fits = Some([under(first), under(second)]);
             let (track, not_finite, fit) = (Track::Fitted, not_finite[at], Some(fit.radiances));
             let views = plain_differences(&both, &guides);
-            each(
-                index,
-                LitPicture { track, lighting: None, references: &references, views, of_fits, fit, not_finite },
-            )?;
+            each(index, LitViews { track, lighting: None, references: &references, views, of_fits, fit, not_finite })?;
         }
     }
     Ok(())
@@ -80,7 +77,7 @@ fn exposed(task: &SceneTask<'_>, radiance: &Picture<LinearRgb>) -> Picture<Linea
 }
 
 /// The encoded difference of each half from the photo, without any correction.
-fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &Guides<'_>) -> Vec<LightDifference> {
+fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &ViewGuides<'_>) -> Vec<LightDifference> {
     let difference = |a: &Picture<LinearRgb>, b: &Picture<LinearRgb>, factor: f64| {
         Picture::from_fn(a.width(), a.height(), |x, y| {
             let [a, b] = [a, b].map(|picture| picture.get(x, y).0.map(|value| encoded(f64::from(value))));
@@ -100,7 +97,7 @@ fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &Guides<'_>) ->
 }
 
 /// The lights whose radiances are fitted, in their world.
-struct LitRoom {
+struct FittedLights {
     world: World,
     names: Vec<String>,
     is_stage: bool,
@@ -112,7 +109,7 @@ struct Fit {
     radiances: FittedRadiances,
 }
 
-impl LitRoom {
+impl FittedLights {
     fn new(task: &SceneTask<'_>, protocol: &Protocol) -> Result<Self, EvalError> {
         if task.scene.lights == SceneLights::Own {
             let names = task.world.scene().lights.iter().map(|light| light.name.clone()).collect();
@@ -124,9 +121,9 @@ impl LitRoom {
         Ok(Self { world: task.world.on_stage(&quads)?, names, is_stage: true })
     }
 
-    fn paths<'a>(&'a self, task: &'a SceneTask<'a>, protocol: &'a Protocol) -> Paths<'a> {
+    fn paths<'a>(&'a self, task: &'a SceneTask<'a>, protocol: &'a Protocol) -> SharedPaths<'a> {
         let pass = if self.is_stage { "stage" } else { "fitted" };
-        Paths {
+        SharedPaths {
             scene: &task.scene.id,
             world: &self.world,
             atlases: task.atlases,
@@ -138,7 +135,7 @@ impl LitRoom {
 
     fn fit(
         &self,
-        paths: &Paths<'_>,
+        paths: &SharedPaths<'_>,
         repaint: &Repaint,
         task: &SceneTask<'_>,
         truths: &[ViewTruth],

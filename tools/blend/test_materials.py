@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Bakes the materials of `.blend` scenes that it builds, and compares them with closed forms.
 
-Run it with a Python that has the bpy module: `~/.cache/mateval/blender/bin/python tools/test_blend.py`.
+Run it with a Python that has the bpy module: `~/.cache/mateval/blender/bin/python tools/blend/test_materials.py`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import unittest
 
 import bpy
 import numpy as np
-from blend_case import ONE_BYTE, Bake, checker, run
+from case import ONE_BYTE, Bake, checker, run
 from mateval.uv_charts import coverage, holds_texture, srgb_bytes
 
 

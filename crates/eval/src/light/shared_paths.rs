@@ -26,7 +26,7 @@ pub(crate) const QUARTERS: [&str; 4] = ["a1", "a2", "b1", "b2"];
 const BATCH_BYTES: u64 = 850 << 20;
 
 /// A scene under some lights, whose paths have seeds of their own.
-pub(crate) struct Paths<'a> {
+pub(crate) struct SharedPaths<'a> {
     pub(crate) scene: &'a SceneId,
     pub(crate) world: &'a World,
     /// The meshes of `instances.glb`, one for each surface of the world.
@@ -37,7 +37,7 @@ pub(crate) struct Paths<'a> {
     pub(crate) progress: Progress<'a>,
 }
 
-impl Paths<'_> {
+impl SharedPaths<'_> {
     /// One stream of everything that travels: predictions, then the truth.
     pub(crate) fn trace(
         &self,

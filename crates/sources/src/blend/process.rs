@@ -10,8 +10,6 @@ use std::time::{Duration, Instant};
 
 use mateval_files::FileError;
 
-use crate::error::PrepError;
-
 /// Time between two looks at the running process.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
@@ -84,12 +82,12 @@ impl BlenderProgram {
 
 /// Runs the command until it ends or exceeds a limit. Its output goes to the file `log`. `on_line` is called with each
 /// line of it, and with `None` after every look at the process.
-pub fn run(
+pub fn run<E: From<FileError>>(
     mut command: Command,
     log: &Path,
     limits: &BlenderLimits,
-    on_line: &mut dyn FnMut(Option<&str>) -> Result<(), PrepError>,
-) -> Result<Ended, PrepError> {
+    on_line: &mut dyn FnMut(Option<&str>) -> Result<(), E>,
+) -> Result<Ended, E> {
     let io = |action| FileError::io(action, log);
     let file = File::create(log).map_err(io("write"))?;
     let other = file.try_clone().map_err(io("write"))?;
@@ -224,7 +222,7 @@ pub const BAKE_SCRIPT: &str = "bake_blend.py";
 const PACKAGE: &str = "mateval";
 
 /// Writes the scripts into `folder/scripts` and returns the path of the one that renders.
-pub fn write_scripts(folder: &Path) -> Result<PathBuf, PrepError> {
+pub fn write_scripts(folder: &Path) -> Result<PathBuf, FileError> {
     let scripts = folder.join("scripts");
     let package = scripts.join(PACKAGE);
     std::fs::create_dir_all(&package).map_err(FileError::io("make", package))?;

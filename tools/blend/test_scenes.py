@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Bakes whole `.blend` scenes that it builds: what is read of them, and what is refused.
 
-Run it with a Python that has the bpy module: `~/.cache/mateval/blender/bin/python tools/test_blend_scenes.py`.
+Run it with a Python that has the bpy module: `~/.cache/mateval/blender/bin/python tools/blend/test_scenes.py`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from blend_case import LIMITS, ONE_BYTE, Bake, run
+from case import LIMITS, ONE_BYTE, Bake, run
 from mateval.bake import make_bench
 from mateval.uv_charts import srgb_bytes
 

@@ -1,22 +1,23 @@
 //! Has Blender bake a `.blend` scene to textures and write it as glTF, by `blender_scripts/bake_blend.py`.
 //!
 //! In: the file, which is untrusted, and its folder, which holds everything that it may name. Out: a GLB, the light
-//! from outside, and what could not be kept. No Python of the file is run.
+//! from outside, and what could not be kept. No Python of the file is run. `process` runs Blender, also for renders.
+
+pub mod process;
 
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::material::{Material, MaterialModel};
 use mateval_dataset::reference::{Emission, LightGroup, SourceTexture, SurfaceIndex};
-use mateval_dataset::{Finding, Role, SceneLights, Severity, json};
+use mateval_dataset::{DatasetError, Finding, Role, SceneLights, Severity, json};
 use mateval_files::FileError;
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_sources::source_scene::FileScene;
 use serde::{Deserialize, Serialize};
 
-use super::process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
-use crate::build::fault::BakeFault;
-use crate::error::PrepError;
+use crate::open::SourceError;
+use crate::source_scene::FileScene;
+use process::{BAKE_SCRIPT, BlenderLimits, BlenderProgram, Ended, run, tail, write_scripts};
 
 const JOB_FORMAT: &str = "mateval-bake/1";
 const RESULT_FORMAT: &str = "mateval-baked/1";
@@ -122,6 +123,19 @@ impl BakedFinding {
     }
 }
 
+/// Why a `.blend` file was not baked.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeFault {
+    #[error(
+        "a .blend file is read by Blender, and none was found; install it with `mateval fetch blender`, or name it with --blender"
+    )]
+    NoBlender,
+    #[error("the .blend file is refused:{}", Finding::list(.0))]
+    Refused(Vec<Finding>),
+    #[error("Blender did not bake the file: {what}; its log ends with:\n{log}")]
+    Failed { what: String, log: String },
+}
+
 /// Bakes the file `blend` into `out`, which is created. Textures have texels of `texel_m`.
 pub fn bake(
     program: &BlenderProgram,
@@ -130,7 +144,7 @@ pub fn bake(
     texel_m: f64,
     out: &Path,
     on_line: &mut dyn FnMut(&str),
-) -> Result<Result<(PathBuf, Baked), BakeFault>, PrepError> {
+) -> Result<Result<(PathBuf, Baked), BakeFault>, SourceError> {
     // Blender has another working folder.
     let absolute = |path: &Path| std::path::absolute(path).map_err(FileError::io("resolve", path));
     let (blend, out) = (absolute(blend)?, absolute(out)?);
@@ -156,7 +170,7 @@ pub fn bake(
     json::write(&job_file, &job)?;
     let ended = run(program.command(&script, &job_file), &log, limits, &mut |line| {
         line.into_iter().for_each(&mut *on_line);
-        Ok(())
+        Ok::<_, FileError>(())
     })?;
     // The result says more than the exit code, as far as the script came.
     let failed = |what: String| Ok(Err(BakeFault::Failed { what, log: tail(&log, SHOWN_LOG) }));
@@ -178,7 +192,7 @@ pub fn bake(
 impl Baked {
     /// Reads the script's result, whose files lie beside it. Fails where it is not a result, names a file elsewhere, or
     /// holds light that no file of Blender can have.
-    pub fn read(path: &Path) -> Result<Self, PrepError> {
+    pub fn read(path: &Path) -> Result<Self, SourceError> {
         let baked: Self = json::read_format(path, RESULT_FORMAT)?;
         let image = match &baked.world {
             Some(BakedWorld::Map { image, .. }) => Some(image),
@@ -201,7 +215,7 @@ impl Baked {
 
     /// Adds to the scene of the GLB, which lies in the folder `out`, what glTF does not have: the light from outside,
     /// lamps without a body, and which base colours nobody states.
-    pub fn complete(&self, read: &mut FileScene, out: &Path) -> Result<(), PrepError> {
+    pub fn complete(&self, read: &mut FileScene, out: &Path) -> Result<(), SourceError> {
         add_world(read, self, out)?;
         hide_lamps(read, self);
         let is_unstated = |material: &&BakedMaterial| material.base_color == "unstated";
@@ -225,7 +239,7 @@ fn is_rotation(rows: [[f32; 3]; 3]) -> bool {
 }
 
 /// Replaces the light of a glTF without lights by the file's own light from outside.
-fn add_world(read: &mut FileScene, baked: &Baked, out: &Path) -> Result<(), PrepError> {
+fn add_world(read: &mut FileScene, baked: &Baked, out: &Path) -> Result<(), SourceError> {
     if read.lights == SceneLights::Stage {
         read.scene.lights.clear();
         read.findings.retain(|finding| finding.code != "no_light");
@@ -236,7 +250,7 @@ fn add_world(read: &mut FileScene, baked: &Baked, out: &Path) -> Result<(), Prep
         Some(BakedWorld::Constant { radiance }) if radiance.iter().all(|v| *v <= 0.0) => return Ok(()),
         Some(BakedWorld::Constant { radiance }) => Emission::Constant { radiance: radiance.map(|v| v.max(0.0)) },
         Some(BakedWorld::Map { image, world_from_environment }) => {
-            let texture = read_texture(&out.join(image), Encoding::Linear, Wrap::Repeat)?;
+            let texture = read_texture(&out.join(image), Encoding::Linear, Wrap::Repeat).map_err(DatasetError::from)?;
             let texture = read.scene.add_texture(SourceTexture::computed("world", texture));
             Emission::Environment { texture, scale: 1.0, world_from_environment: *world_from_environment }
         }

@@ -31,9 +31,9 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, NoReturn
 
-from corpus_files import find_cases
-from corpus_page import write_page
-from corpus_run import Outcome, Result, Step, fault, judge, png_pixels, run_limited, try_case
+from files import find_cases
+from page import write_page
+from run import Outcome, Result, Step, fault, judge, png_pixels, run_limited, try_case
 
 
 def try_folder(*, folder: Path, out: Path, words: argparse.Namespace) -> list[Result]:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Bakes MatEval's procedural graphs, as OSL in Blender, and compares them with `mateval graph render`.
 
-    test_blend_graphs.py MATEVAL FOLDER
+    test_graphs.py MATEVAL FOLDER
 
 MATEVAL is the program. FOLDER holds copies of `crates/procedural/library/*.mtlx` and what
 `crates/procedural/tests/peers/generate_osl.py FOLDER` has made of them. Run it with a Python that has the bpy module.
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from blend_case import ONE_BYTE, Bake, run
+from case import ONE_BYTE, Bake, run
 from mateval.uv_charts import srgb_bytes
 
 EDGE = 256
