@@ -43,6 +43,7 @@ mod suite {
     mod publish;
     mod real_scenes;
     mod recentred;
+    mod redress;
     mod release;
     mod relit;
     mod reprojection;

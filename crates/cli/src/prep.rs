@@ -175,7 +175,8 @@ impl StatsArgs {
             check_output_file(picture, "--picture", "picture", self.force)?;
         }
         let dataset = open_dataset(&self.dataset)?;
-        let counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
+        let mut counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
+        counted.look = stats::look::look(&dataset)?;
         if let Some(picture) = &self.picture {
             write_whole(picture, stats::show::picture(&counted).as_bytes())?;
         }

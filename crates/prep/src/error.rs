@@ -10,6 +10,7 @@ use mateval_files::untrusted::in_words;
 
 use crate::build::fault::BuildFault;
 use crate::recipe::fault::RecipeFault;
+use crate::redress::secret::SecretFault;
 
 /// Why a dataset, its renders or a survey could not be made or examined.
 #[derive(Debug, thiserror::Error)]
@@ -71,6 +72,9 @@ pub enum PrepError {
         "'{name}' is none of the survey's {houses} houses; name one by its file relative to --source, or by the file's name"
     )]
     UnknownHouse { name: String, houses: usize },
+    /// The key of a survey's redressed scenes.
+    #[error(transparent)]
+    Key(#[from] SecretFault),
     /// A path given to a survey does not lie in the source's folder.
     #[error("{0}; a recipe cannot refer to it: name the folder that contains all inputs with --source")]
     OutsideSource(#[from] mateval_files::source_folder::BelowError),

@@ -64,6 +64,10 @@ pub struct SurveyArgs {
     /// With --scenes: the most scenes of one house.
     #[arg(long, value_name = "NUMBER", requires = "scenes", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     scenes_per_house: u32,
+    /// Redress the recipe's scenes: give all their parts other materials, drawn with this key, a file of at least 32
+    /// random bytes. It must lie outside of --source and --out.
+    #[arg(long, value_name = "KEY")]
+    redress: Option<PathBuf>,
     /// Search this house only, and leave the survey of all to a later run without --house; may be given several times.
     /// It is a house's file relative to --source, or the file's name without .json. Several processes may search
     /// different houses of one survey at once.
@@ -116,6 +120,7 @@ impl SurveyArgs {
             camera_rules: self.camera_rules,
             only: self.only.clone(),
             goal: self.scenes.map(|scenes| SelectionGoal::of_paper(scenes as usize, self.scenes_per_house as usize)),
+            redress: self.redress.clone(),
             out: self.out.clone(),
             force: self.force,
         })

@@ -303,3 +303,71 @@ fn drawn_settings(graph: &Graph, class: MaterialClass, place: Place, draw: &mut 
     }
     settings
 }
+
+#[cfg(test)]
+mod tests {
+    use mateval_dataset::SceneId;
+    use mateval_image::Texels;
+
+    use super::super::secret::Secret;
+    use super::*;
+
+    fn draw(part: &str) -> Draw {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("key"), [3; 32]).unwrap();
+        let secret = Secret::open(&folder.path().join("key"), None, &[]).unwrap();
+        secret.draw(&SceneId::new("a").unwrap(), part)
+    }
+
+    /// Every class has a material everywhere, whose finish is that of the class.
+    #[test]
+    fn every_class_is_dressed_within_its_finish() {
+        let places: Vec<[f64; 3]> =
+            (0..400).map(|at| [0.031 * f64::from(at % 20), 0.047 * f64::from(at / 20), 0.002]).collect();
+        for class in MaterialClass::ALL {
+            for place in [Place::Floor, Place::Wall, Place::Ceiling, Place::Thing] {
+                for number in 0..4 {
+                    let part = format!("{class} {place:?} {number}");
+                    let drawn = || Drawn::new(class, place, &[], &mut draw(&part)).unwrap().at(&places, false);
+                    let shown = drawn();
+                    assert_eq!(shown, drawn());
+                    let mean = shown.iter().map(|values| values[1]).sum::<f64>() / 400.0;
+                    assert!(mean > 0.01 && mean < 0.95, "{part}: {mean}");
+                    let ([least, most], metallic) = finish_of(class);
+                    let [least, most] = [least, most].map(f64::from);
+                    // Streaks of brushed metal vary its roughness.
+                    assert!(shown.iter().all(|v| v[3] > 0.7 * least && v[3] < 1.4 * most), "{part}");
+                    assert!(shown.iter().all(|v| v[4] == f64::from(metallic)), "{part}");
+                }
+            }
+        }
+    }
+
+    /// A picture of vertical stripes of 1/8 of its side: after `size_m * scale` metres the pattern is there again, and
+    /// grain runs along u, or along v for a part that is longer there.
+    #[test]
+    fn pictures_repeat_by_metres_and_grain_runs_along_u() {
+        let texels = (0..64 * 64).map(|at| if at % 8 < 4 { [255; 3] } else { [0; 3] }).collect();
+        let color = Texture::new(64, 64, Texels::Srgb8(texels), Wrap::Repeat).unwrap();
+        let is_upright = is_upright(&color);
+        assert!(is_upright);
+        let (roughness, metalness) = (None, None);
+        let tile = Tile { color, roughness, metalness, tint: [1.0; 3], size_m: 1.6, is_upright, finish: [0.5, 0.0] };
+        let drawn = Drawn { pattern: Pattern::Tile(Box::new(tile)), scale: 0.5, turn: 0.0, shift: [0.0; 2] };
+        let red = |u: f64, v: f64, is_turned: bool| drawn.at(&[[u, v, 0.001]], is_turned)[0][0];
+        for at in 0..100 {
+            let along = 0.0123 * f64::from(at);
+            // A stripe and its gap take a tenth of a metre: an eighth of 1.6 m times 0.5.
+            assert!((red(0.3, along, false) - red(0.3, along + 0.1, false)).abs() < 1e-3);
+            assert!((red(along, 0.3, false) - red(0.0, 0.3, false)).abs() < 1e-3, "constant along the grain");
+            assert!((red(0.3, along, true) - red(0.3, 0.0, true)).abs() < 1e-3, "turned");
+        }
+        let spread = |step: f64| {
+            (0..100)
+                .map(|at| red(0.3, step * f64::from(at), false))
+                .fold([1.0, 0.0], |[a, b]: [f64; 2], v| [a.min(v), b.max(v)])
+        };
+        let [least, most] = spread(0.0123);
+        assert!(least < 0.05 && most > 0.95, "{least} {most}");
+    }
+}

@@ -1,8 +1,9 @@
 //! Counts what a dataset contains: the numbers of the paper's Table I, and those behind them.
 //!
 //! In: an open dataset, but only its `dataset.json` and the `scene.json` of each scene. Out: [`StatsFile`], which
-//! [`show`] prints as tables and draws as a chart.
+//! [`show`] prints as tables and draws as a chart. [`look`](look::look) adds how the true albedo of input views looks.
 
+pub mod look;
 pub mod show;
 
 use std::cmp::Reverse;
@@ -18,6 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::PrepError;
+use look::LookStats;
 
 /// The value of `format` in this version of the statistics.
 pub const STATS_FORMAT: &str = "mateval-stats/1";
@@ -46,6 +48,9 @@ pub struct StatsFile {
     pub super_categories_per_scene: Option<Spread>,
     /// Number of different categories per scene, of the objects that have a category; null as above.
     pub categories_per_scene: Option<Spread>,
+    /// How the true albedo looks; absent where the ground truth is withheld, and in reports.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look: Option<LookStats>,
     /// Counts of all scenes together.
     pub total: Counts,
     /// Counts of each scene, in the dataset's order.
@@ -175,6 +180,7 @@ pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, PrepError> {
         objects_per_scene: spread(&per_scene, |counts| counts.objects),
         super_categories_per_scene: spread(&per_scene, Counts::different_super_categories),
         categories_per_scene: spread(&per_scene, Counts::different_categories),
+        look: None,
         total: counts(scenes),
         per_scene,
     })

@@ -12,7 +12,7 @@ use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use super::{CategoryCount, Counts, SceneStats, Spread, StatsFile, SuperCategoryCount};
+use super::{CategoryCount, Counts, SceneStats, Spread, StatsFile, SuperCategoryCount, look};
 
 /// Length of the longest name that is printed in full, in characters.
 const LONGEST_CELL: usize = 60;
@@ -22,16 +22,15 @@ const HEADS: [&str; 8] = ["cabinet", "sofa", "lighting", "chair", "others", "bed
 
 /// All tables, for a terminal of `columns`; of any width if absent. Table I comes first, with the paper's headings.
 pub fn text(stats: &StatsFile, columns: Option<usize>) -> String {
-    let tables = [
-        table_one(stats),
-        beside(stats),
+    let look = stats.look.iter().map(look::table);
+    let tables = [table_one(stats), beside(stats)].into_iter().chain(look).chain([
         super_categories(&stats.total),
         categories(&stats.total),
         findings(&stats.total),
         scenes(stats),
         scenes_by_super_category(stats),
-    ];
-    tables.map(|table| table.text(columns)).join("\n")
+    ]);
+    tables.map(|table| table.text(columns)).collect::<Vec<_>>().join("\n")
 }
 
 fn table_one(stats: &StatsFile) -> Table {

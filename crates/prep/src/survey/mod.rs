@@ -25,6 +25,7 @@ use mateval_files::FileError;
 use mateval_files::source_folder::{common_folder, relative_below};
 
 use crate::error::PrepError;
+use crate::redress::Secret;
 use house::{HouseName, HouseSearch, SurveyFolder, shown};
 use output::merge;
 pub use rules::SurveyOptions;
@@ -51,6 +52,9 @@ pub struct Surveyed {
 pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<Surveyed, PrepError> {
     check_folders(options)?;
     let source = source_folder(options)?;
+    if let Some(key) = &options.redress {
+        Secret::open(key, None, &[&source, &options.out])?;
+    }
     let options = &relative_to(&source, options)?;
     let houses = house_files(options, &source)?;
     let wanted = chosen(&houses, &options.only)?;
@@ -119,6 +123,12 @@ fn relative_to(source: &Path, options: &SurveyOptions) -> Result<SurveyOptions, 
         models: relative(&options.models)?,
         textures: options.textures.as_ref().map(relative).transpose()?,
         cameras: options.cameras.as_ref().map(relative).transpose()?,
+        // The key lies outside of the source's folder.
+        redress: options
+            .redress
+            .as_ref()
+            .map(|key| key.canonicalize().map_err(FileError::io("find", key)))
+            .transpose()?,
         ..options.clone()
     })
 }

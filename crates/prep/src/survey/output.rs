@@ -138,8 +138,10 @@ fn scene_text(options: &SurveyOptions, house: &str, room: &str, camera: &Candida
         }
     }
     let CandidateCamera { scene, position, target, fov_y_deg, origin, .. } = camera;
+    let redress = options.redress.as_ref().map(|key| format!("redress = {{ key = {} }}\n", shown(key)));
+    let redress = redress.unwrap_or_default();
     format!(
-        "\n[[scene]]\nid = {}\nfront3d = {{ {keys} }}\n# {origin}\n\
+        "\n[[scene]]\nid = {}\nfront3d = {{ {keys} }}\n{redress}# {origin}\n\
          camera = {{ position = {position:?}, target = {target:?}, fov_y_deg = {fov_y_deg:?} }}\n",
         quoted(scene)
     )

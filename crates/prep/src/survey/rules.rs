@@ -47,6 +47,8 @@ pub struct SurveyOptions {
     pub only: Vec<String>,
     /// The scenes to choose; every accepted room where absent.
     pub goal: Option<SelectionGoal>,
+    /// The key with which the recipe's scenes are redressed; they are not where absent.
+    pub redress: Option<PathBuf>,
     pub out: PathBuf,
     /// Replace a survey that already exists.
     pub force: bool,

@@ -278,6 +278,7 @@ mod tests {
                 objects_per_scene: spread(13.17),
                 super_categories_per_scene: spread(4.3),
                 categories_per_scene: spread(8.0),
+                look: None,
                 total: counts(),
                 per_scene: ids()
                     .map(|scene| SceneStats {

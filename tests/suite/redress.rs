@@ -1,0 +1,192 @@
+//! Redressed rooms, from the recipe to the maps: the built-in sample with other materials, drawn with a key.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_image::{Picture, png_io};
+use serde_json::Value;
+
+use super::command::{build, render, run, run_words, stats, verify};
+use super::sample::{files_below, json, manifest};
+use mateval_testkit::kept_folder;
+
+/// A folder with the sample in `source`, a `key`, a folder of `materials`, and these datasets: the `original` with
+/// classes of material, two of the same key (`first`, `again`), and one of an `other` key.
+static BUILT: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("redress");
+    run_words([Path::new("sample"), &folder.join("source")]).ends_with(0);
+    write_materials(&folder.join("materials"));
+    made(&folder, "original", "");
+    std::fs::write(folder.join("key"), [7; 32]).unwrap();
+    let redress = "redress = { key = \"../key\" }";
+    made(&folder, "first", redress);
+    made(&folder, "again", redress);
+    std::fs::write(folder.join("key"), [8; 32]).unwrap();
+    made(&folder, "other", redress);
+    folder
+});
+
+/// A floor of wide stripes and a cloth, with names that occur nowhere else.
+fn write_materials(folder: &Path) {
+    let stripes = |x: usize, _| if x % 64 < 32 { [200, 60, 20] } else { [20, 60, 200] };
+    for name in ["WoodFloorSecretum", "FabricSecretum"] {
+        let place = folder.join(name);
+        std::fs::create_dir_all(&place).unwrap();
+        let picture = Picture::from_fn(64, 64, stripes);
+        png_io::write_rgb_bytes(&place.join(format!("{name}_1K_Color.png")), &picture).unwrap();
+    }
+}
+
+fn made(folder: &Path, name: &str, redress: &str) {
+    let recipe = recipe(folder, redress);
+    run(&mut build(&recipe, &folder.join(name))).ends_with(0);
+}
+
+fn recipe(folder: &Path, redress: &str) -> PathBuf {
+    let path = folder.join("source/redress.toml");
+    let room = "house = \"house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json\", room = \"LivingDiningRoom-101\", \
+                models = \"house/3D-FUTURE-model\", textures = \"house/3D-FRONT-texture\", appearance = \"stated\"";
+    let text = format!(
+        "name = \"redress\"\nresolution = [64, 48]\natlas_size = 128\nviews = []\n\
+         [[scene]]\nid = \"living\"\nfront3d = {{ {room} }}\ncamera = {{ designer = 0 }}\n{redress}\n\
+         [[scene]]\nid = \"room\"\nbitterli = \"room/scene.xml\"\n{redress}\n"
+    );
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn bytes(dataset: &str, file: &str) -> Vec<u8> {
+    let path = BUILT.join(dataset).join("scenes").join(file);
+    std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn scene(dataset: &str, scene: &str) -> Value {
+    json(&BUILT.join(dataset).join(format!("scenes/{scene}/scene.json")))
+}
+
+#[test]
+fn the_same_key_makes_the_same_bytes_and_another_key_other_maps() {
+    assert_eq!(manifest(&BUILT.join("first")), manifest(&BUILT.join("again")));
+    let mut counts = [0, 0];
+    for id in ["living", "room"] {
+        let weak = weak(&scene("first", id));
+        for instance in scene("first", id)["instances"].as_array().unwrap() {
+            let name = instance["id"].as_str().unwrap();
+            if instance["atlas"].is_null() {
+                continue;
+            }
+            let map = format!("{id}/ground_truth/materials/{name}/base_color.png");
+            let [original, first, other] = ["original", "first", "other"].map(|dataset| bytes(dataset, &map));
+            let is_kept = weak.contains(&(name.to_owned(), "kept".to_owned()));
+            assert_eq!(original == first, is_kept, "{id} {name}");
+            assert_eq!(first == other, is_kept, "{id} {name}");
+            counts[usize::from(is_kept)] += 1;
+        }
+        // Geometry is the same, and so are classes of parts.
+        for file in ["views/input/depth.exr", "views/input/instance.png", "views/input/part.png"] {
+            assert_eq!(bytes("original", &format!("{id}/{file}")), bytes("first", &format!("{id}/{file}")), "{file}");
+        }
+    }
+    assert!(counts[0] > 30 && counts[1] >= 1, "{counts:?}");
+    let classes = "living/ground_truth/material_classes.json";
+    assert_eq!(bytes("original", classes), bytes("first", classes));
+}
+
+/// The weak secrets of a scene, with their reasons.
+fn weak(scene: &Value) -> BTreeSet<(String, String)> {
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let weak = scene["redressed"]["weak"].as_array().unwrap();
+    weak.iter().map(|weak| (text(&weak["instance"]), text(&weak["reason"]))).collect()
+}
+
+#[test]
+fn the_dataset_states_what_is_no_good_secret() {
+    let room = scene("first", "room");
+    let weak = weak(&room);
+    for (instance, reason) in [("mirror", "kept"), ("rug", "motif")] {
+        assert!(weak.contains(&(instance.to_owned(), reason.to_owned())), "{weak:?}");
+    }
+    assert!(!weak.iter().any(|(instance, _)| instance == "sofa" || instance == "window_glass"), "{weak:?}");
+    let shares = room["redressed"]["weak"].as_array().unwrap().iter().map(|weak| weak["area_share"].as_f64().unwrap());
+    let total = room["redressed"]["weak_area_share"].as_f64().unwrap();
+    assert!((shares.sum::<f64>() - total).abs() < 1e-9 && total > 0.01 && total < 0.3, "{total}");
+    let findings = room["findings"].to_string();
+    assert_eq!(findings.matches("weak_secret").count(), weak.len());
+    assert_eq!(scene("original", "room")["redressed"], Value::Null);
+    let living = &scene("first", "living")["source"];
+    assert_eq!([&living["states_roughness"], &living["states_metallic"]], [&Value::from(true); 2]);
+    run(&mut verify(&BUILT.join("first"))).ends_with(0);
+    run(&mut stats(&BUILT.join("first"))).ends_with(0).prints("local contrast");
+}
+
+/// Lamps shine as before, glass is the same, and no texture of the source stays but those of lights.
+#[test]
+fn lights_and_glass_stay_and_textures_go() {
+    for id in ["living", "room"] {
+        let reference = |dataset: &str| {
+            json(&BUILT.join(dataset).join(format!("scenes/{id}/ground_truth/reference/reference.json")))
+        };
+        let [original, first] = ["original", "first"].map(reference);
+        let glass = |file: &Value| {
+            let all = file["materials"].as_array().unwrap().iter().map(|material| material["model"].clone());
+            all.filter(|model| model.to_string().contains("dielectric")).collect::<Vec<_>>()
+        };
+        assert_eq!(glass(&original), glass(&first));
+        let lights = |dataset: &str| {
+            let file = json(&BUILT.join(dataset).join(format!("scenes/{id}/ground_truth/lights.json")));
+            let groups = file["groups"].as_array().unwrap().clone();
+            let light = |group: &Value| (group["name"].clone(), group["emission"]["radiance"].clone());
+            groups.iter().map(light).collect::<Vec<_>>()
+        };
+        assert_eq!(lights("original"), lights("first"));
+        let of_lights = json(&BUILT.join("first").join(format!("scenes/{id}/ground_truth/lights.json"))).to_string();
+        for (at, texture) in first["textures"].as_array().unwrap().iter().enumerate() {
+            let is_ours = texture["source"].as_str().unwrap().starts_with("redressed");
+            assert!(is_ours || of_lights.contains(&format!("\"texture\":{at}")), "{id} {texture}");
+        }
+        let names: Vec<&Value> = first["materials"].as_array().unwrap().iter().map(|m| &m["name"]).collect();
+        assert!(
+            names.iter().filter(|name| name.to_string().contains("redressed")).count() + 3 >= names.len(),
+            "{names:?}"
+        );
+    }
+}
+
+#[test]
+fn materials_come_from_the_folder_and_are_not_named() {
+    let name = "tiles";
+    made(&BUILT, name, "redress = { key = \"../key\", materials = \"../materials\" }");
+    let dataset = BUILT.join(name);
+    for file in files_below(&dataset) {
+        let bytes = std::fs::read(dataset.join(&file)).unwrap();
+        assert!(!bytes.windows(8).any(|window| window == b"Secretum"), "{}", file.display());
+    }
+    let path = dataset.join("scenes/room/ground_truth/materials/floor/base_color.png");
+    let map = png_io::read_srgb(&path).unwrap();
+    let is_red = map.pixels().iter().filter(|pixel| pixel.0[0] > pixel.0[2]).count() as f64 / map.pixels().len() as f64;
+    assert!(is_red > 0.2 && is_red < 0.8, "{is_red}");
+    run(&mut render(&dataset, 1)).ends_with(0);
+}
+
+#[test]
+fn keys_that_are_no_secret_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    run_words([Path::new("sample"), &folder.path().join("source")]).ends_with(0);
+    let refused = |redress: &str, text: &str| {
+        let recipe = recipe(folder.path(), redress);
+        run(&mut build(&recipe, &folder.path().join("dataset"))).ends_with(2).says(text);
+        assert!(!folder.path().join("dataset").exists());
+    };
+    let with = |key: &str| format!("redress = {{ key = \"{key}\" }}");
+    std::fs::write(folder.path().join("key"), [1; 31]).unwrap();
+    std::fs::write(folder.path().join("source/key"), [1; 32]).unwrap();
+    refused(&with("../key"), "has 31 bytes; expected 32 or more random ones");
+    refused(&with("../none"), "cannot be read");
+    refused(&with("key"), "which may be published; keep keys and materials elsewhere");
+    std::fs::write(folder.path().join("key"), [1; 32]).unwrap();
+    refused("redress = { key = \"../key\", materials = \"room\" }", "which may be published");
+    std::fs::create_dir(folder.path().join("empty")).unwrap();
+    refused("redress = { key = \"../key\", materials = \"../empty\" }", "holds no material");
+    refused("redress = { key = \"../key\" }\nphoto = \"a.png\"", "`redress` changes the room");
+}
