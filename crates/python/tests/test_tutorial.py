@@ -1,15 +1,19 @@
-"""The tutorial runs as it is, and shows what its scores say."""
+"""The tutorial and the examples of the documentation run as they are."""
 
+import doctest
 import json
 import pathlib
+import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import mateval
 
 TUTORIAL = pathlib.Path(__file__).parent.parent / "tutorial.ipynb"
+README = TUTORIAL.with_name("README.md")
 
 
 def test_the_tutorial_ends_with_scores_and_pictures(root, command, tmp_path, monkeypatch):
@@ -40,3 +44,29 @@ def test_the_tutorial_is_typed(tmp_path):
         [sys.executable, "-m", "mypy", "--strict", "tutorial.py"], capture_output=True, text=True, cwd=tmp_path
     )
     assert checked.returncode == 0, checked.stdout
+
+
+def run_example(source, root, extra):
+    """Runs an example of the documentation, on the tests' dataset and its room."""
+    namespace = {"mateval": mateval, **extra}
+    exec(source.replace('"DATASET"', repr(str(root))).replace('["living"]', '["room"]'), namespace)
+
+
+def test_the_examples_of_the_package_run(root, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    examples = doctest.DocTestParser().get_examples(mateval.__doc__)
+    assert len(examples) >= 5
+    grey = {"my_estimate": lambda photo: np.full(photo.shape, 0.5, np.float32)}
+    run_example("".join(example.source for example in examples), root, grey)
+    assert pathlib.Path("OUT/submission.json").exists()
+
+
+def test_the_examples_of_the_readme_run(root, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first, training, *_ = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
+    run_example(first, root, {"estimate": lambda photo: np.full(photo.shape, 0.5, np.float32)})
+    assert pathlib.Path("OUT/submission.json").exists()
+    pytest.importorskip("torch")
+    # Batches need pictures of one size, which the tests' dataset has.
+    run_example(training.replace('"OUT"', '"TRAINED"'), root, {"dataset": mateval.open(root)})
+    assert pathlib.Path("TRAINED/submission.json").exists()
