@@ -4,7 +4,6 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::titles::shown_method;
 use mateval_dataset::dataset::DatasetVersion;
 use mateval_dataset::{DatasetError, Finding, SceneId, Severity};
 use mateval_eval::EvalError;
@@ -12,6 +11,8 @@ use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
 use mateval_files::FileError;
+
+use crate::titles::shown_method;
 
 /// Why results could not be shown, or a dataset not be published or described.
 #[derive(Debug, thiserror::Error)]
