@@ -256,8 +256,10 @@ fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), Data
         return Err(error);
     }
     let path = root.to_owned();
-    let is_withheld =
-        |finding: &Finding| finding.code == manifest::MISSING_FILE && finding.file.contains("/ground_truth/");
+    let is_withheld = |finding: &Finding| {
+        let is_truth = finding.code == manifest::MISSING_FILE && finding.file.contains("/ground_truth/");
+        is_truth || finding.code == manifest::WITHHELD_FILE
+    };
     if findings.iter().all(is_withheld) {
         return Err(DatasetError::TruthWithheld { path, files: findings.len(), first: findings[0].file.clone() });
     }

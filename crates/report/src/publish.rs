@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use mateval_dataset::dataset::{DatasetFile, SceneFile, Secrecy};
-use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST, SceneFolder, is_ground_truth};
+use mateval_dataset::layout::{COMPARE, DATASET, MANIFEST, SceneFolder, WHOLE_SCENE, is_ground_truth};
 use mateval_dataset::manifest::{self, Entry, lines, public_lines};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::verdict::VerdictFile;
@@ -79,7 +79,7 @@ pub fn publish(
     copy(root, hidden, &withheld, &|done| progress(Report::step("private folder", done, withheld.len())))?;
     for scene in &dataset.scenes {
         let original = format!("scenes/{}/scene.json", scene.id);
-        let place = format!("scenes/{}/ground_truth/scene.json", scene.id);
+        let place = format!("scenes/{}/{WHOLE_SCENE}", scene.id);
         let Some(entry) = shown.iter_mut().find(|entry| entry.file == original) else { continue };
         copy_file(root, &original, hidden, &place)?;
         withheld.push(Entry { sha256: entry.sha256.clone(), file: place });

@@ -93,7 +93,9 @@ impl PublishArgs {
             check_report(options, &halves)?;
         }
         if halves.is_none() {
-            Dataset::open(&self.dataset)?.check_may_be_shown(self.with_ground_truth)?;
+            Dataset::open(&self.dataset)
+                .and_then(|dataset| dataset.check_may_be_shown(self.with_ground_truth))
+                .context("cannot report on the release")?;
         }
         let release = options.as_ref().map(CheckedRelease::new).transpose().context("cannot report on the release")?;
         let published = halves.map(|[public, private]| split(self, public, private)).transpose()?;
@@ -249,7 +251,9 @@ impl ExportArgs {
             (FormatName::Nerfstudio, None) => Format::Nerfstudio,
             (FormatName::Colmap, None) => Format::Colmap,
         };
-        Dataset::open(&self.dataset)?.check_may_be_shown(self.with_ground_truth)?;
+        Dataset::open(&self.dataset)
+            .and_then(|dataset| dataset.check_may_be_shown(self.with_ground_truth))
+            .context("cannot export the dataset")?;
         let options = ExportOptions {
             dataset: self.dataset.clone(),
             format,

@@ -13,6 +13,8 @@ pub const COMPARE: &str = "compare.json";
 /// The list of a scene's references in `ground_truth/renders/scorer`. It is written last, so its presence means that
 /// the pictures are complete.
 pub const SCORER_JSON: &str = "scorer.json";
+/// The whole `scene.json` of a hidden split, in the scene's folder; the public one leaves out what leads to its sources.
+pub const WHOLE_SCENE: &str = "ground_truth/whole_scene.json";
 /// The input view's id.
 pub const INPUT: &str = "input";
 

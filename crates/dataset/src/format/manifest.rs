@@ -16,10 +16,13 @@ use crate::{DatasetError, Finding, Severity};
 pub const MISSING_FILE: &str = "missing_file";
 pub(crate) const UNLISTED_FILE: &str = "unlisted_file";
 
-/// Whether a file is missing because the whole ground truth of its scene is withheld, which is not a fault.
+/// The code of a finding about a file that a hidden split withholds.
+pub const WITHHELD_FILE: &str = "withheld_file";
+
+/// Whether a file is missing because it is withheld, or the whole ground truth of its scene is, which is not a fault.
 pub fn is_withheld(root: &Path, finding: &Finding) -> bool {
     let folder = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
-    finding.code == MISSING_FILE && folder.is_some_and(|folder| !folder.exists())
+    finding.code == WITHHELD_FILE || finding.code == MISSING_FILE && folder.is_some_and(|folder| !folder.exists())
 }
 
 /// The files below `root`, relative and sorted, without the manifest, `dataset.json`, `compare.json`, what the manifest
@@ -234,7 +237,7 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
             findings.push(fault("unlisted_file", &file, String::new(), &message));
             listed.insert(file);
         } else {
-            findings.push(missing_file(&file));
+            findings.push(fault(WITHHELD_FILE, &file, String::new(), "the manifest names it as withheld"));
         }
     }
     for file in list_files(root)? {

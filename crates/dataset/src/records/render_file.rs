@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::changes::SceneHashes;
-use crate::layout::{is_input_picture, is_rendered};
+use crate::layout::{WHOLE_SCENE, is_input_picture, is_rendered};
 use crate::{DatasetError, RendererId, SceneId, ViewId};
 use mateval_files::untrusted::sha256_of_bytes;
 
@@ -98,10 +98,16 @@ pub struct ScorerFile {
 /// or, of a scene that was built since, as it was built.
 pub fn light_inputs_sha256(root: &Path, scene: &SceneId) -> Result<String, DatasetError> {
     let hashes = SceneHashes::open(root, scene)?;
+    // In a hidden split that is whole, the scene's file as it was before it was split counts.
+    let [scene_file, whole_file] = ["scene.json", WHOLE_SCENE].map(|file| format!("scenes/{scene}/{file}"));
+    let whole = hashes.entries().find(|(file, _)| **file == *whole_file).map(|(_, sha256)| sha256);
     // The input picture is a copy of a render.
-    let is_input = |file: &str| !is_rendered(file) && !is_input_picture(file);
-    let inputs = hashes.entries().filter(|(file, _)| is_input(file));
-    let lines: String = inputs.map(|(file, sha256)| format!("{sha256}  {file}\n")).collect();
+    let is_input = |file: &str| !is_rendered(file) && !is_input_picture(file) && file != whole_file;
+    let line = |(file, sha256): (&str, &str)| {
+        let sha256 = whole.filter(|_| file == scene_file).unwrap_or(sha256);
+        format!("{sha256}  {file}\n")
+    };
+    let lines: String = hashes.entries().filter(|(file, _)| is_input(file)).map(line).collect();
     Ok(sha256_of_bytes(lines.as_bytes()))
 }
 
