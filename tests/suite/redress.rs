@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use mateval_image::{Picture, png_io};
 use serde_json::Value;
 
-use super::command::{build, render, run, run_words, stats, verify};
+use super::command::{build, mateval, render, run, run_words, stats, verify};
 use super::sample::{files_below, json, manifest};
 use mateval_testkit::kept_folder;
 
@@ -189,4 +189,29 @@ fn keys_that_are_no_secret_are_refused() {
     std::fs::create_dir(folder.path().join("empty")).unwrap();
     refused("redress = { key = \"../key\", materials = \"../empty\" }", "holds no material");
     refused("redress = { key = \"../key\" }\nphoto = \"a.png\"", "`redress` changes the room");
+}
+
+#[test]
+fn surveys_write_redressed_scenes() {
+    let (source, folder) = (BUILT.join("source"), tempfile::tempdir().unwrap());
+    let survey = |key: &Path| {
+        let mut command = mateval();
+        command.args([
+            "prep",
+            "survey",
+            "house/3D-FRONT",
+            "--models",
+            "house/3D-FUTURE-model",
+            "--cameras-per-room",
+            "1",
+        ]);
+        command.args(["--resolution", "64", "48", "--source"]).arg(&source).arg("--redress").arg(key);
+        run(command.arg("--out").arg(folder.path().join("survey")))
+    };
+    survey(&source.join("recipe.toml")).ends_with(2).says("which may be published");
+    survey(&BUILT.join("key")).ends_with(0);
+    let recipe = std::fs::read_to_string(folder.path().join("survey/recipe.toml")).unwrap();
+    let key = BUILT.join("key").canonicalize().unwrap();
+    let count = recipe.matches(&format!("redress = {{ key = \"{}\" }}", key.display())).count();
+    assert!(count > 0 && count == recipe.matches("[[scene]]").count(), "{recipe}");
 }

@@ -4,11 +4,13 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec2};
-use mateval_dataset::TriangleMesh;
+use mateval_dataset::{Camera, TriangleMesh};
 use mateval_procedural::unfolding::{Chart, PartFrame, Triangle};
 
-/// The side of a texel in metres, unless a surface needs too many.
-const TEXEL_M: f64 = 0.002;
+/// How far a pixel's content is from the camera, in metres, whose half is a texel.
+const NEAR_M: f64 = 1.5;
+/// The finest texels, in metres.
+const FINEST_M: f64 = 0.0005;
 /// The most texels of a texture, of which gutters and gaps between blocks take a part.
 const MOST_TEXELS: f64 = 4e6;
 /// The most texels of a block's side.
@@ -26,6 +28,13 @@ pub(super) struct Parts<'a> {
     pub(super) is_one_frame: bool,
     /// Whether patterns stay upright; otherwise they run along the longest side.
     pub(super) is_upright: bool,
+    /// The side of a texel, unless a surface needs too many of them.
+    pub(super) texel_m: f64,
+}
+
+/// The side of texels of which two are a pixel of this camera on what is near.
+pub(super) fn texel_of(camera: &Camera) -> f64 {
+    (NEAR_M / camera.intrinsics.fx / 2.0).max(FINEST_M)
 }
 
 /// A rectangle of texels with the material of one part.
@@ -86,7 +95,7 @@ impl Layout {
                 (0..2).for_each(|axis| most[axis] = most[axis].max(at[axis]));
             }
         }
-        let texel_m = texel_m(extents.values());
+        let texel_m = fitting(parts.texel_m, extents.values());
         let turned: Vec<bool> = (0..frames.len()).map(|part| is_turned(part, &frames, &corners, parts)).collect();
         let mut blocks: Vec<Block> =
             extents.iter().map(|(key, extent)| block(*key, *extent, texel_m, &turned)).collect();
@@ -160,12 +169,12 @@ fn is_turned(part: usize, frames: &[Option<PartFrame>], corners: &[Triangle], pa
     sides[1] * height.max(1e-9).sqrt() > sides[0] * width.max(1e-9).sqrt()
 }
 
-/// The side of a texel with which all blocks fit.
-fn texel_m<'a>(extents: impl Iterator<Item = &'a [[f64; 2]; 2]>) -> f64 {
+/// The side of a texel, or that with which all blocks fit where it is larger.
+fn fitting<'a>(texel_m: f64, extents: impl Iterator<Item = &'a [[f64; 2]; 2]>) -> f64 {
     let sides = extents.map(|[least, most]| [most[0] - least[0], most[1] - least[1]]);
     let (area, longest) =
         sides.fold((0.0, 0.0), |(area, longest): (f64, f64), [u, v]| (area + u * v, longest.max(u).max(v)));
-    TEXEL_M.max((area / MOST_TEXELS).sqrt()).max(longest / MOST_SIDE)
+    texel_m.max((area / MOST_TEXELS).sqrt()).max(longest / MOST_SIDE)
 }
 
 fn block((part, _): (usize, Option<Chart>), [least, most]: [[f64; 2]; 2], texel_m: f64, turned: &[bool]) -> Block {
@@ -220,10 +229,16 @@ mod tests {
 
     #[test]
     fn a_metre_has_as_many_texels_everywhere_and_blocks_do_not_overlap() {
+        const TEXEL_M: f64 = 0.002;
         let (mesh, of_triangle) = table();
         let is_constant = [false, false, true];
-        let parts =
-            Parts { of_triangle: &of_triangle, is_constant: &is_constant, is_one_frame: false, is_upright: false };
+        let parts = Parts {
+            of_triangle: &of_triangle,
+            is_constant: &is_constant,
+            is_one_frame: false,
+            is_upright: false,
+            texel_m: TEXEL_M,
+        };
         let layout = Layout::new(&mesh, &parts);
         let laid = layout.mesh(&mesh);
         let uvs = laid.uvs.as_ref().unwrap();
@@ -236,35 +251,31 @@ mod tests {
             assert!((a.distance(b) - expected).abs() < 0.02, "{at}: {} {expected}", a.distance(b));
         }
         let mut owners = vec![0; layout.size[0] * layout.size[1]];
-        for block in &layout.blocks {
-            for row in block.at[1]..block.at[1] + block.size[1] {
-                owners[row * layout.size[0]..][block.at[0]..block.at[0] + block.size[0]]
-                    .iter_mut()
-                    .for_each(|n| *n += 1);
+        for Block { at: [x, y], size: [columns, rows], .. } in &layout.blocks {
+            for row in *y..y + rows {
+                owners[row * layout.size[0]..][*x..x + columns].iter_mut().for_each(|count| *count += 1);
             }
         }
         assert!(owners.iter().all(|count| *count <= 1));
         // The grain of the legs runs upwards though they are farther apart than high.
-        let turned = |part: usize| layout.blocks.iter().find(|block| block.part == part).unwrap().is_turned;
-        assert!(turned(1) && !turned(2));
-        // A texel's place is where its uv lead: the corner of the top.
-        let block = layout.blocks.iter().find(|block| block.part == 0).unwrap();
-        let pixel = uvs[laid.triangles[0][0] as usize];
-        let (x, y) = (f64::from(pixel.x * size.x) - 0.5, f64::from((1.0 - pixel.y) * size.y) - 0.5);
-        let frame =
-            frames(&(0..8).map(|at| mesh.corners(at).map(|c| c.as_dvec3())).collect::<Vec<_>>(), &parts)[0].unwrap();
+        let of_part = |part: usize| layout.blocks.iter().find(|block| block.part == part).unwrap();
+        assert!(of_part(1).is_turned && !of_part(2).is_turned);
+        // The texel that a corner's uv leads to has the corner's place.
+        let pixel = uvs[laid.triangles[0][0] as usize] * size;
+        let [x, y] = [f64::from(pixel.x), f64::from(size.y - pixel.y)];
+        let block = of_part(0);
+        let [u, v, _] = block.place(0, 0, TEXEL_M);
+        let found = [u + (x - block.at[0] as f64 - 0.5) * TEXEL_M, v - (y - block.at[1] as f64 - 0.5) * TEXEL_M];
+        let corners: Vec<Triangle> = (0..8).map(|at| mesh.corners(at).map(|corner| corner.as_dvec3())).collect();
+        let frame = frames(&corners, &parts)[0].unwrap();
         let expected = frame.place(Chart::Front, mesh.positions[0].as_dvec3());
-        let [u, v] = [
-            block.corner[0] + (x - block.at[0] as f64 + 0.5) * TEXEL_M,
-            block.corner[1] - (y - block.at[1] as f64 + 0.5) * TEXEL_M,
-        ];
-        assert!((u - expected[0]).abs() < 1e-4 && (v - expected[1]).abs() < 1e-4, "{u} {v} {expected:?}");
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?} {expected:?}");
     }
 
     #[test]
     fn a_hall_has_coarser_texels() {
         let extents = [[[0.0; 2], [100.0, 40.0]], [[0.0; 2], [1.0, 1.0]]];
-        assert!(texel_m(extents.iter()) > 0.03);
-        assert_eq!(texel_m(extents[1..].iter()), TEXEL_M);
+        assert!(fitting(0.002, extents.iter()) > 0.03);
+        assert_eq!(fitting(0.002, extents[1..].iter()), 0.002);
     }
 }

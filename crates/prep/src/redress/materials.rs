@@ -68,7 +68,9 @@ impl Drawn {
         tiles: &[TileFiles],
         draw: &mut Draw,
     ) -> Result<Self, ImageError> {
-        let of_class: Vec<&TileFiles> = tiles.iter().filter(|tile| tile.class == class).collect();
+        // Wallpaper is for walls, and not for ceilings and painted frames.
+        let is_tiled = class != MaterialClass::Paint || place == Place::Wall;
+        let of_class: Vec<&TileFiles> = tiles.iter().filter(|tile| is_tiled && tile.class == class).collect();
         let suited = |tile: &&&TileFiles| tile.is_for_floors == (place == Place::Floor);
         let best: Vec<&TileFiles> = of_class.iter().filter(suited).copied().collect();
         let choice = if best.is_empty() { of_class } else { best };
@@ -79,8 +81,9 @@ impl Drawn {
         let read = |path, encoding| read_texture(path, encoding, Wrap::Repeat);
         let color = read(&files.color, Encoding::Srgb)?;
         let tint = draw.between([0.8, 1.15]);
+        let has_grain = matches!(class, MaterialClass::Wood | MaterialClass::Board | MaterialClass::Metal);
         let tile = Tile {
-            is_upright: is_upright(&color),
+            is_upright: has_grain && is_upright(&color),
             color,
             roughness: files.roughness.as_deref().map(|path| read(path, Encoding::Linear)).transpose()?,
             metalness: files.metalness.as_deref().map(|path| read(path, Encoding::Linear)).transpose()?,
@@ -89,7 +92,9 @@ impl Drawn {
             finish: drawn_finish(class, draw),
         };
         let shift = [(); 2].map(|()| draw.between([0.0, tile.size_m]));
-        let (turn, scale) = (*draw.one(&[0.0, PI]), draw.between([0.8, 1.25]));
+        // A picture on a wall must not stand on its head.
+        let turn = if place == Place::Wall { 0.0 } else { *draw.one(&[0.0, PI]) };
+        let scale = draw.between([0.8, 1.25]);
         Ok(Self { pattern: Pattern::Tile(Box::new(tile)), scale, turn, shift })
     }
 
@@ -184,7 +189,7 @@ fn is_upright(picture: &Texture) -> bool {
 fn tile_size_m(class: MaterialClass, place: Place) -> f64 {
     match class {
         MaterialClass::Wood if place == Place::Floor => 1.6,
-        MaterialClass::Tile | MaterialClass::Stone | MaterialClass::Paint => 1.5,
+        MaterialClass::Tile | MaterialClass::Stone => 1.5,
         MaterialClass::Cloth | MaterialClass::Suede => 0.4,
         MaterialClass::Leather | MaterialClass::SmoothLeather | MaterialClass::Wicker => 0.5,
         _ => 1.0,
@@ -237,13 +242,13 @@ fn ranges(class: MaterialClass, place: Place) -> &'static [[[f64; 2]; 3]] {
             &[[[0.32, 0.65], [0.04, 0.09], [40.0, 75.0]], [[0.24, 0.9], [0.0, 0.02], WARM]]
         }
         (Is::Wicker, _) => &[[[0.5, 0.78], [0.04, 0.08], [60.0, 85.0]]],
-        (Is::CoarseCloth, _) => &[[[0.4, 0.85], [0.0, 0.06], ANY]],
-        (Is::Cloth, _) => &[[[0.35, 0.9], [0.0, 0.03], ANY], [[0.35, 0.8], [0.03, 0.09], ANY]],
+        (Is::CoarseCloth, _) => &[[[0.4, 0.85], [0.0, 0.045], ANY]],
+        (Is::Cloth, _) => &[[[0.35, 0.9], [0.0, 0.03], ANY], [[0.35, 0.8], [0.02, 0.07], ANY]],
         (Is::Paint, Place::Ceiling) => &[[[0.88, 0.96], [0.0, 0.01], WARM]],
         (Is::Paint, _) => &[[[0.75, 0.94], [0.0, 0.035], ANY], [[0.82, 0.95], [0.0, 0.015], WARM]],
         (Is::Lacquer, _) => &[[[0.8, 0.95], [0.0, 0.015], WARM], [[0.35, 0.9], [0.0, 0.04], ANY]],
         (Is::Metal, _) => &[[[0.68, 0.88], [0.0, 0.01], ANY], [[0.68, 0.84], [0.05, 0.09], [60.0, 90.0]]],
-        (Is::Glass | Is::Plastic, _) => &[[[0.3, 0.92], [0.0, 0.02], ANY], [[0.4, 0.8], [0.03, 0.1], ANY]],
+        (Is::Glass | Is::Plastic, _) => &[[[0.3, 0.92], [0.0, 0.02], ANY], [[0.4, 0.8], [0.02, 0.08], ANY]],
     }
 }
 

@@ -34,7 +34,7 @@ use palette::convert::FromColorUnclamped;
 use palette::{LinSrgb, Oklch};
 use rayon::prelude::*;
 
-use charts::{Block, Layout, Parts};
+use charts::{Block, Layout, Parts, texel_of};
 use materials::{Drawn, Values, linear};
 pub(crate) use secret::Secret;
 use surfaces::{Place, Treatment, class_of, lamps, place, treatment};
@@ -78,10 +78,12 @@ struct Redresser<'a> {
     /// New materials without a layout, by the source's and whether they are plain.
     others: BTreeMap<(usize, bool), MaterialIndex>,
     weak: WeakAreas,
+    texel_m: f64,
 }
 
 /// Redresses the scene `id`. Fails where a picture of the private folder cannot be read.
 pub(crate) fn redress(source: &mut SourceScene, id: &SceneId, secret: &Secret) -> Result<WeakAreas, ImageError> {
+    let texel_m = texel_of(&source.camera);
     let read = &mut source.read;
     let lamps = lamps(&read.scene, &read.origins);
     let (materials, textures) = (read.scene.materials.clone(), read.scene.texture_list());
@@ -95,6 +97,7 @@ pub(crate) fn redress(source: &mut SourceScene, id: &SceneId, secret: &Secret) -
         laid: Vec::new(),
         others: BTreeMap::new(),
         weak: WeakAreas::default(),
+        texel_m,
     };
     for (at, origin) in read.origins.iter_mut().enumerate() {
         redresser.surface(at, origin, &lamps)?;
@@ -126,7 +129,7 @@ impl WeakAreas {
             reason: *reason,
             area_share: share(*area),
         });
-        Redressed { weak_area_share: share(self.of.values().sum()), weak: weak.collect() }
+        Redressed { weak_area_share: share(self.of.values().fold(0.0, |sum, area| sum + area)), weak: weak.collect() }
     }
 
     /// A note on every weak secret.
@@ -247,6 +250,7 @@ impl Redresser<'_> {
                     is_constant: &is_constant,
                     is_one_frame: matches!(place, Place::Floor | Place::Ceiling),
                     is_upright: place == Place::Wall,
+                    texel_m: self.texel_m,
                 };
                 self.lay(own.clone(), &source, look, &units, &parts)?
             }
