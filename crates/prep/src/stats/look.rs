@@ -152,6 +152,6 @@ mod tests {
         assert!(chroma.mean < 1e-3 && contrast.mean < 1e-6 && fine.mean == 0.0, "{chroma:?} {contrast:?}");
         let checks = |size: usize| of(move |x, y| if (x / size + y / size) % 2 == 0 { 0.2 } else { 0.6 });
         let [[.., sharp, finest], [.., coarser]] = [checks(1), checks(4)];
-        assert!(sharp.mean > 0.1 && finest.mean > 0.9 && coarser.mean < 0.6, "{sharp:?} {finest:?} {coarser:?}");
+        assert!(sharp.mean > 0.1 && finest.mean > 0.9 && coarser.mean < 0.7, "{sharp:?} {finest:?} {coarser:?}");
     }
 }
