@@ -75,7 +75,7 @@ fn both_trees_together_are_a_whole_dataset_of_the_same_identity() {
     run(&mut baseline("grey", &public, &grey)).ends_with(0);
     run(&mut score(&grey, &public, &result)).ends_with(2).says("this needs the whole dataset");
     run(&mut score(&grey, &whole, &result)).ends_with(0);
-    assert_eq!(json(&result)["findings"], serde_json::json!([]));
+    assert!(!json(&result)["findings"].to_string().contains("\"error\""));
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn the_commitment_holds_for_this_truth_alone() {
     assert!(manifest(copy.path()).contains(&std::fs::read_to_string(SPLIT.join("commitment")).unwrap()));
     opened(copy.path()).ends_with(0);
     // Another truth, with a list that fits it.
-    let file = "scenes/room/ground_truth/lights.json";
+    let file = "scenes/room/ground_truth/renders/builtin/up_left/render.json";
     let [truth, list] = [file, "withheld.sha256"].map(|name| copy.path().join(name));
     let changed = std::fs::read_to_string(&truth).unwrap() + " ";
     let hash = |text: &str| sha256_of_bytes(text.as_bytes());
@@ -170,13 +170,13 @@ fn rounded_results_are_no_oracle() {
     let shown = |submission: &Path| {
         run(score(submission, &whole, &result).arg("--force").arg("--rounded").arg(&rounded)).ends_with(0);
         let file = json(&rounded);
-        assert!(!file.to_string().contains("instance") && file["headline"].as_object().unwrap().len() == 1, "{file}");
+        assert!(!file.to_string().contains("instance") && file["headline"]["mateval-3"].is_object(), "{file}");
         file["headline"]["mateval-3"]["albedo.novel.psnr"].as_f64().unwrap()
     };
     let psnr_of = |color: [f32; 3]| {
         let bytes = color.map(|value| (255.0 * srgb_from_linear(value)).round() as u8);
         for map in &maps {
-            png_io::write_rgb_bytes(&submission.join(map), &Picture::filled(8, 8, bytes)).unwrap();
+            png_io::write_rgb_bytes(&submission.join(map), &Picture::filled(64, 64, bytes)).unwrap();
         }
         shown(&submission)
     };
@@ -204,6 +204,11 @@ fn rounded_results_are_no_oracle() {
 #[test]
 fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
     let out = tempfile::tempdir().unwrap();
+    // The ends of maps that are no constants: a single colour may occur anywhere.
+    let maps = contents(&SPLIT.join("private")).into_iter();
+    let maps: Vec<_> =
+        maps.filter(|(file, bytes)| file.ends_with("base_color.png") && bytes.len() > 4000).take(3).collect();
+    assert_eq!(maps.len(), 3);
     for (at, format) in ["tar", "croissant", "huggingface", "nerfstudio", "colmap"].into_iter().enumerate() {
         let export = |dataset: &str| {
             let place = out.path().join(format!("{dataset}-{at}"));
@@ -220,7 +225,7 @@ fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
         let (mut command, place) = export("public");
         run(&mut command).ends_with(0);
         for (file, bytes) in contents(&place) {
-            assert!(!holds(&bytes, b"ground_truth/materials/"), "{file:?}");
+            assert!(!maps.iter().any(|(_, map)| holds(&bytes, &map[map.len() - 64..])), "{file:?}");
         }
     }
     let report = out.path().join("report");

@@ -23,7 +23,7 @@ pub mod table_one;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::dataset::{DatasetFile, SceneFile};
 use mateval_dataset::manifest::Manifest;
 use mateval_dataset::open::{Dataset, check_outside};
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, scene_cost};
@@ -106,6 +106,8 @@ impl<'a> CheckedRelease<'a> {
         let mut file = self.gather(tool, findings, work.path(), progress)?;
         if let Some(published) = published {
             file.dataset.manifest_sha256.clone_from(&published.manifest_sha256);
+            let split = DatasetFile { manifest_sha256: published.manifest_sha256.clone(), ..self.dataset.file.clone() };
+            file.citation = bibtex(&split, &self.options.publication);
             withhold(&mut file, published.secrecy, &published.commitment);
         } else if let Some(secrecy) = self.dataset.file.withheld {
             let commitment = Manifest::read(&self.dataset.root)?.commitment.unwrap_or_default();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use mateval_dataset::dataset::Target;
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::manifest;
+use mateval_dataset::manifest::Manifest;
 use mateval_dataset::open::Dataset;
 use mateval_prep::stats::{Spread, StatsFile};
 use schemars::JsonSchema;
@@ -28,7 +28,8 @@ impl Evaluated {
     pub(crate) fn of(dataset: &Dataset) -> Result<Self, ReportError> {
         let targets = &dataset.targets.targets;
         let is_input = |target: &&Target| target.view.as_str() == INPUT;
-        let files: BTreeSet<String> = manifest::entries(&dataset.root)?.into_iter().map(|entry| entry.file).collect();
+        let Manifest { entries, withheld, .. } = Manifest::read(&dataset.root)?;
+        let files: BTreeSet<String> = entries.into_iter().map(|entry| entry.file).chain(withheld).collect();
         let albedo = |target: &Target| {
             files.contains(&format!("scenes/{}/ground_truth/views/{}/albedo.exr", target.scene, target.view))
         };
