@@ -89,7 +89,7 @@ pub struct Vote {
     /// The id of the method whose picture was on the right.
     pub right: String,
     /// Which of them is closer to the truth.
-    pub choice: Choice,
+    pub choice: Closer,
     /// From when the pictures were shown until the choice.
     pub seconds: f64,
 }
@@ -97,7 +97,7 @@ pub struct Vote {
 /// Which picture is closer to the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Choice {
+pub enum Closer {
     /// That on the left.
     Left,
     /// That on the right.
@@ -284,9 +284,9 @@ impl Tally {
         let at = |id: &str| place(file.methods.iter().find(|method| method.id == id)?, ranking);
         let (Some(left), Some(right)) = (at(&vote.left), at(&vote.right)) else { return };
         let share = match vote.choice {
-            Choice::Left => 1.0,
-            Choice::Equal => 0.5,
-            Choice::Right => 0.0,
+            Closer::Left => 1.0,
+            Closer::Equal => 0.5,
+            Closer::Right => 0.0,
         };
         let methods = self.votes.len();
         self.wins[left * methods + right] += share;
@@ -456,10 +456,10 @@ mod tests {
             .into()
     }
 
-    fn sitting(voter: &str, votes: Vec<(&str, &str, Choice)>) -> VotesFile {
+    fn sitting(voter: &str, votes: Vec<(&str, &str, Closer)>) -> VotesFile {
         let method =
             |id: &str| VotedMethod { id: id.to_owned(), method: id.to_owned(), submission_sha256: String::new() };
-        let vote = |(left, right, choice): (&str, &str, Choice)| Vote {
+        let vote = |(left, right, choice): (&str, &str, Closer)| Vote {
             scene: SceneId::new("s00").unwrap(),
             view: "input".to_owned(),
             picture: "albedo".to_owned(),
@@ -500,7 +500,7 @@ mod tests {
             for (left, right) in (0..4).flat_map(|a| (0..4).map(move |b| (a, b))).filter(|(a, b)| a != b) {
                 for _ in 0..times {
                     let closer = 1.0 / (1.0 + (strengths[right] - strengths[left]).exp());
-                    let choice = if uniform() < closer { Choice::Left } else { Choice::Right };
+                    let choice = if uniform() < closer { Closer::Left } else { Closer::Right };
                     votes.push((names[left], names[right], choice));
                 }
             }
@@ -551,7 +551,7 @@ mod tests {
 
     #[test]
     fn ties_are_half_a_vote_for_either() {
-        use Choice::{Equal, Left, Right};
+        use Closer::{Equal, Left, Right};
         let even = counted(&[sitting("x", vec![("a", "b", Equal), ("b", "a", Equal)])]).unwrap();
         assert_eq!([of(&even, "a").strength, of(&even, "b").strength], [Some(0.0); 2]);
         assert_eq!((of(&even, "a").wins, of(&even, "a").votes), (1.0, 2));
@@ -563,7 +563,7 @@ mod tests {
 
     #[test]
     fn one_voter_has_strengths_without_intervals() {
-        let found = counted(&[sitting("x", vec![("a", "b", Choice::Left), ("d", "c", Choice::Right)])]).unwrap();
+        let found = counted(&[sitting("x", vec![("a", "b", Closer::Left), ("d", "c", Closer::Right)])]).unwrap();
         // By symmetry a and c have strength s, b and d -s. Each pair has a third of a given tie, so the likelihood of a
         // has its maximum where 1 + 3 / 6 = 5 / 3 p + 1 / 6 with p = 1 / (1 + exp(-2 s)): p = 0.8, s = ln 2.
         let ln_2 = (std::f64::consts::LN_2 * 1e6).round() / 1e6;
@@ -586,7 +586,7 @@ mod tests {
 
     #[test]
     fn votes_that_cannot_be_counted_are_named() {
-        let vote = || vec![("a", "b", Choice::Left)];
+        let vote = || vec![("a", "b", Closer::Left)];
         let mut files = ["w", "x", "y", "z"].map(|voter| sitting(voter, vote()));
         files[0].fingerprint = "0123".to_owned();
         files[1].methods[1].submission_sha256 = "changed".to_owned();
