@@ -27,7 +27,7 @@ SCENES = results.scene_names(12)
 
 
 def make_small(folder: Path) -> Path:
-    """Six submissions on twelve scenes, with pictures of six scenes, errata and verifications."""
+    """Six submissions on twelve scenes, with pictures of six scenes, errata, verifications and a page to vote on."""
     paths = []
     for name, method, psnr, seed, said in METHODS:
         path = folder / f"{method[:10]}.json"
@@ -46,7 +46,7 @@ def make_small(folder: Path) -> Path:
     ceiling.write_text(results.pretty(results.result(method="gt", psnr=48.0, scenes=SCENES, seed=7)))
     results.write_verification(ceiling, confirmed=True, key=key)
     subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", site, "--pictures", folder / "pictures", "--ceiling", ceiling,
-                    "--errata", folder / "errata.json", "--trust", f"{key}.pub"], check=True, stdout=subprocess.DEVNULL)
+                    "--errata", folder / "errata.json", "--trust", f"{key}.pub", "--votes"], check=True, stdout=subprocess.DEVNULL)
     return site
 
 

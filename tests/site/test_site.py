@@ -7,7 +7,9 @@ MATEVAL_TEST_PICTURES=DIR it writes screenshots there.
 import csv
 import json
 import os
+import subprocess
 import tempfile
+import time
 import unittest
 from contextlib import closing
 from html.parser import HTMLParser
@@ -15,7 +17,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from chromium import Page
-from sites import EVIL, SCENES, make_large, make_small
+from sites import EVIL, MATEVAL, METHODS, SCENES, make_large, make_small
 
 PICTURES = os.environ.get("MATEVAL_TEST_PICTURES")
 
@@ -88,7 +90,8 @@ LOOK = """(() => {
 
 
 class TestLooks(unittest.TestCase):
-    PAGES = ["index.html", "scenes.html", "protocol.html", "paper.html", "errata.html", "methods/copya.html", "scenes/room-002.html"]
+    PAGES = ["index.html", "scenes.html", "protocol.html", "paper.html", "errata.html", "robustness.html", "votes.html",
+             "methods/copya.html", "scenes/room-002.html"]
 
     def test_every_page_at_two_widths_light_and_dark(self) -> None:
         looked_at = 0
@@ -105,7 +108,7 @@ class TestLooks(unittest.TestCase):
                             shade = "dark" if dark else "light"
                             page.picture(f"{PICTURES}/{name.replace('/', '-')}-{width}-{shade}.png", whole=True)
                     self.assertEqual(page.faults, [])
-        self.assertEqual(looked_at, 28)
+        self.assertEqual(looked_at, 36)
 
     def test_the_ceiling_has_the_columns_of_the_board(self) -> None:
         """As many cells as heads, the same ones hidden after a choice, and never sorted among the methods."""
@@ -159,6 +162,36 @@ class TestLooks(unittest.TestCase):
         self.assertGreater(look["wide"], 0)
         page.run("new Promise((done) => setTimeout(done, 50))")
         self.assertIn("planted", " ".join(page.faults))
+
+
+class TestVotes(unittest.TestCase):
+    def test_votes_by_keys_and_buttons_are_saved_and_counted(self) -> None:
+        page = Page(width=1400, height=900, dark=False)
+        self.addCleanup(page.close)
+        out = tempfile.TemporaryDirectory()
+        self.addCleanup(out.cleanup)
+        page.send("Page.setDownloadBehavior", behavior="allow", downloadPath=out.name)
+        page.open((small / "votes.html").as_uri())
+        # The second vote is taken back.
+        press = "document.body.dispatchEvent(new KeyboardEvent('keydown', { key: '%s', bubbles: true }))"
+        click = "document.querySelector('button[value=%s]').click()"
+        for act in [press % "ArrowLeft", press % "ArrowDown", press % "Backspace", press % "ArrowRight", click % "equal"]:
+            page.wait_for("since !== null")
+            page.run(act)
+        page.run("form.elements.voter.value = 'A. B.'")
+        page.run(click % "save")
+        page.wait_for("saved === 3")
+        end = time.monotonic() + 10
+        while not list(Path(out.name).glob("votes-*.json")) and time.monotonic() < end:
+            time.sleep(0.05)
+        (path,) = Path(out.name).glob("votes-*.json")
+        file = json.loads(path.read_text())
+        self.assertEqual(([vote["choice"] for vote in file["votes"]], file["voter"]), (["left", "right", "equal"], "A. B."))
+        self.assertEqual(page.faults, [])
+        results = [small.parent / f"{name[:10]}.json" for name, *_ in METHODS]
+        counted = subprocess.run([MATEVAL, "eval", "votes", path, "--result", *results, "--format", "json"], check=True,
+                                 capture_output=True)
+        self.assertEqual(json.loads(counted.stdout)["votes"], 3)
 
 
 class TestLinks(unittest.TestCase):

@@ -22,6 +22,7 @@ use mateval_report::leaderboard::entries::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
 use mateval_report::release::ReleaseFile;
 use mateval_report::rounded::RoundedFile;
+use mateval_report::votes::{Preferences, VotesFile};
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
 use serde_json::Value;
@@ -40,7 +41,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 /// The JSON Schema of every kind of JSON file, made from the Rust type that reads and writes it.
-fn schemas() -> [(&'static str, Schema); 27] {
+fn schemas() -> [(&'static str, Schema); 29] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -59,6 +60,8 @@ fn schemas() -> [(&'static str, Schema); 27] {
         ("lint", schema_for!(LintFile)),
         ("leaderboard", schema_for!(LeaderboardFile)),
         ("errata", schema_for!(ErrataFile)),
+        ("votes", schema_for!(VotesFile)),
+        ("preferences", schema_for!(Preferences)),
         ("stats", schema_for!(StatsFile)),
         ("release", schema_for!(ReleaseFile)),
         ("survey", schema_for!(SurveyFile)),

@@ -16,7 +16,8 @@ SCHEMAS = Path("dataset_spec/schema")
 GROUPS = {
     "Dataset": ["dataset", "targets", "scene", "compare_verdict"],
     "Ground truth": ["reference", "source_materials", "lights", "material_classes", "render", "scorer"],
-    "Submissions and results": ["submission", "lint", "result", "rounded", "verification", "explain", "leaderboard", "errata"],
+    "Submissions and results": ["submission", "lint", "result", "rounded", "verification", "explain", "leaderboard", "errata", "votes",
+                                "preferences"],
     "Reports of a dataset": ["survey", "stats", "compare", "release"],
     "Baselines": ["encoding", "import", "import_materials"],
     "Between MatEval and Blender": ["blender_job", "blender_result"],

@@ -426,6 +426,7 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
             folders: ranked.iter().map(|baseline| places.submission(*baseline)).collect(),
             shown: vec![Shown::Albedo, Shown::Light { track: Track::True, samples }],
         }),
+        votes: false,
         tool: TOOL.to_owned(),
     };
     with_progress(|progress| leaderboard::write(&plan, &places.leaderboard, true, progress))

@@ -21,7 +21,7 @@ use mateval_submission::SubmissionError;
 use mateval_submission::archive::Opened;
 use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
-use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs};
+use self::show::{ExplainArgs, LeaderboardArgs, PicturesArgs, TablesArgs, VotesArgs};
 use crate::TOOL;
 use crate::arguments::{Format, check_output_file, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
@@ -49,6 +49,9 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Ranks results and writes them as a site that opens from the disk.
     Leaderboard(LeaderboardArgs),
+    /// Counts people's votes on a leaderboard's pictures: the strength of each method, and which number orders methods
+    /// as people do.
+    Votes(VotesArgs),
 }
 
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
@@ -61,6 +64,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Explain(args) => args.run(),
         Command::Verify(args) => args.run(),
         Command::Leaderboard(args) => args.run(),
+        Command::Votes(args) => args.run(),
     }
 }
 

@@ -32,6 +32,9 @@ pub enum ReportError {
     /// Every reason.
     #[error("these results cannot make a leaderboard:{}", Finding::list(.0))]
     UnfitFiles(Vec<Finding>),
+    /// Every reason.
+    #[error("these votes cannot be counted:{}", Finding::list(.0))]
+    UnfitVotes(Vec<Finding>),
     /// Files that were given are not about the dataset that is released, or are something else: every reason. Correct
     /// them, or leave them out.
     #[error("these files cannot be part of the release's report:{}", Finding::list(.0))]
@@ -72,6 +75,11 @@ pub enum ReportError {
         path.display()
     )]
     UnscoredSubmission { path: PathBuf },
+    #[error(
+        "no scene has pictures of the truth and of two methods that people could vote on; add --dataset with a \
+         --submission for each method, or --pictures, or leave out --votes"
+    )]
+    NothingToVoteOn,
     #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,
     /// More than the bootstrap can draw from.

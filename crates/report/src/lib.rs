@@ -2,8 +2,9 @@
 //!
 //! In: results; for pictures also the dataset and the submissions. Out: tables ([`tables`]), ranks with intervals
 //! ([`ranking`]), a site ([`leaderboard`]), pictures side by side ([`strips`]), an explanation of where and how the
-//! albedo of a scene errs ([`explain`]), the metrics of two picture files ([`pair`]). Results that contradict each
-//! other, or what they are shown with, are refused with every reason ([`error`]).
+//! albedo of a scene errs ([`explain`]), the metrics of two picture files ([`pair`]), the strengths of methods by people's
+//! votes on a site's pictures ([`votes`]). Results that contradict each other, or what they are shown with, are refused
+//! with every reason ([`error`]).
 //!
 //! Of a dataset that is released, [`publish`] makes a public and a private copy, and [`release`] a page that describes
 //! it and can be cited.
@@ -19,5 +20,6 @@ pub mod rounded;
 pub mod strips;
 pub mod tables;
 mod titles;
+pub mod votes;
 
 pub use error::ReportError;

@@ -1,4 +1,4 @@
-//! The commands that show results: `mateval eval tables`, `explain`, `pictures` and `leaderboard`.
+//! The commands that show results: `mateval eval tables`, `explain`, `pictures`, `leaderboard` and `votes`.
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -16,6 +16,7 @@ use mateval_report::leaderboard::marks::{TrustedKeys, Verified};
 use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, marks, write};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
+use mateval_report::votes::{plain, preferences};
 use mateval_submission::archive::Opened;
 
 use crate::TOOL;
@@ -285,6 +286,10 @@ pub struct LeaderboardArgs {
     /// Show pictures of a hidden split, whose ground truth everybody can then see.
     #[arg(long, requires = "dataset")]
     with_ground_truth: bool,
+    /// Add votes.html, on which people choose between pairs of pictures beside the truth; needs pictures of two methods.
+    /// `mateval eval votes` counts the files that it saves.
+    #[arg(long)]
+    votes: bool,
     /// JSON file of errors that were found after publication.
     #[arg(long)]
     errata: Option<PathBuf>,
@@ -345,11 +350,41 @@ impl LeaderboardArgs {
                 folders: opened.iter().map(|submission| submission.root().to_owned()).collect(),
                 shown: self.strips.shown_in_leaderboard(dataset),
             }),
+            votes: self.votes,
             tool: TOOL.to_owned(),
         };
         with_progress(|progress| write(&plan, &self.out, self.force, progress))
             .context("cannot write the leaderboard")?;
         print(&format!("{}\n", self.out.join("index.html").display()))?;
+        Ok(Outcome::Good)
+    }
+}
+
+#[derive(clap::Args)]
+pub struct VotesArgs {
+    /// Files that votes.html of a leaderboard has saved.
+    #[arg(required = true, value_name = "VOTES.json")]
+    votes: Vec<PathBuf>,
+    /// RESULT.json files of the leaderboard that was voted on, all of them.
+    #[arg(long = "result", required = true, num_args = 1.., value_name = "RESULT.json")]
+    results: Vec<PathBuf>,
+    /// The leaderboard was made with --partial.
+    #[arg(long)]
+    partial: bool,
+    /// How to print the strengths and correlations.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+}
+
+impl VotesArgs {
+    /// Prints the strengths of methods, and how well each headline number predicts them.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        let results = self.results.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+        let found = preferences(&self.votes, &results, self.partial, TOOL)?;
+        print(&match self.format {
+            Format::Json => json::to_text(&found),
+            Format::Text => plain(&found, columns()),
+        })?;
         Ok(Outcome::Good)
     }
 }

@@ -193,6 +193,8 @@ pub struct LeaderboardPlan<'a> {
     pub pictures: Option<&'a Path>,
     /// Submissions to draw pictures of.
     pub submissions: Option<Submissions<'a>>,
+    /// Whether the site has a page on which people vote on its pictures.
+    pub votes: bool,
     pub tool: String,
 }
 

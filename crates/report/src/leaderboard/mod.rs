@@ -18,9 +18,11 @@ pub mod marks;
 mod method_page;
 mod pictures;
 mod reference_pages;
+mod robustness;
 mod rooms;
 mod scene_page;
 mod site;
+mod votes_page;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -31,7 +33,7 @@ use mateval_files::work_folder::{WorkFolder, check_free};
 use self::board::Board;
 pub use self::entries::{LeaderboardPlan, Submissions};
 use self::file::LEADERBOARD_PATH;
-use self::site::{PAGES, PERTURBED, Site, SiteWriter, WIDE_VIEWS};
+use self::site::{PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
@@ -44,10 +46,13 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     let ceiling = plan.ceiling.map(|result| board::ceiling(result, &ranking)).transpose()?;
     let work = WorkFolder::start(out)?;
     let named = pictures::named(plan, &ranking)?;
+    if plan.votes && plan.pictures.is_none() && named.len() < 2 {
+        return Err(ReportError::NothingToVoteOn);
+    }
     let pictures = pictures::gather(plan, &named, &ranking, &work.path().join("pictures"), progress)?;
     let rooms = rooms::write(plan, &named, &ranking, &work.path().join("rooms"), progress)?;
     let board = Board::new(plan, ranking, ceiling, pictures, rooms);
-    let site = SiteWriter::new(work.path(), site(&board));
+    let site = SiteWriter::new(work.path(), site(&board, plan.votes));
     site.assets()?;
     board_page::write_downloads(&board, plan.protocol, &site)?;
     board_page::write(&board, &site)?;
@@ -64,6 +69,10 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     scene_page::write_rooms(&board, &site)?;
     curves::write_wide_views(&board, &site)?;
     curves::write_perturbed(&board, &site)?;
+    robustness::write(&board, &site)?;
+    if plan.votes {
+        votes_page::write(&board, &site)?;
+    }
     reference_pages::write(&board, plan, &site)?;
     Ok(work.finish()?)
 }
@@ -78,7 +87,7 @@ fn check_place(out: &Path, force: bool) -> Result<(), ReportError> {
     Ok(check_free(out, force, "--out")?)
 }
 
-fn site(board: &Board<'_>) -> Site {
+fn site(board: &Board<'_>, votes: bool) -> Site {
     let (dataset, ranking) = (&board.file.dataset, board.ranking());
     Site {
         title: format!("{} {} leaderboard", dataset.name, dataset.version),
@@ -93,6 +102,8 @@ fn site(board: &Board<'_>) -> Site {
             .into_iter()
             .chain(curves::has_wide_views(board).then_some(WIDE_VIEWS))
             .chain(curves::has_perturbed(board).then_some(PERTURBED))
+            .chain(robustness::has_page(board).then_some(ROBUSTNESS))
+            .chain(votes.then_some(VOTES))
             .collect(),
     }
 }
@@ -131,6 +142,7 @@ mod tests {
             about: Some("Send it to *us*."),
             pictures: None,
             submissions: None,
+            votes: false,
             tool: "mateval".to_owned(),
         }
     }
@@ -183,6 +195,39 @@ mod tests {
         assert_eq!((file.methods.len(), file.ranking.keys.len()), (3, 2));
         let lines = text("downloads/leaderboard.csv").lines().count();
         assert_eq!((lines, text("methods/bad.csv").lines().count()), (1 + 3 * 2, 1 + 12));
+    }
+
+    /// Pictures of two methods and of the truth in one view, of a third in no view: one pair.
+    #[test]
+    fn people_vote_on_pictures_beside_the_truth() {
+        let folder = tempfile::tempdir().unwrap();
+        let (set, out) = (folder.path().join("set"), folder.path().join("site"));
+        let mut results = three();
+        results[2].submission.oracle = true;
+        let view = mateval_dataset::ViewId::new("input").unwrap();
+        let add = |method: &str, kind: &str| {
+            let path = pictures::place(&set, method, &results[0].dataset.scenes[0], &view, kind);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            png_io::write_rgb_bytes(&path, &Picture::filled(8, 6, [90; 3])).unwrap();
+        };
+        [pictures::TRUTH, "good", "bad"].into_iter().for_each(|method| add(method, "albedo"));
+        let with_votes = |pictures| LeaderboardPlan { pictures, votes: true, ..plan(&results) };
+        for pictures in [None, Some(set.as_path())] {
+            let error = write(&with_votes(pictures), &out, false, &quiet).unwrap_err().to_string();
+            assert!(error.contains("pictures of the truth and of two methods"), "{error}");
+        }
+        ["albedo", "albedo-error", "unknown"].into_iter().for_each(|kind| add("b-bold-b", kind));
+        write(&with_votes(Some(&set)), &out, false, &quiet).unwrap();
+        let page = std::fs::read_to_string(out.join("votes.html")).unwrap();
+        let data = page.split("data-board=\"").nth(1).unwrap().split('"').next().unwrap();
+        let data = data.replace("&quot;", "\"").replace("&#x2f;", "/").replace("&lt;", "<").replace("&gt;", ">");
+        let data: serde_json::Value = serde_json::from_str(&data).unwrap();
+        let shown = serde_json::json!([{
+            "scene": "s00", "view": "input", "picture": "albedo", "methods": ["good", "b-bold-b"]
+        }]);
+        assert_eq!((&data["pictures"], &data["methods"][1]["method"]), (&shown, &"<b>bold</b>".into()));
+        assert_eq!(data["fingerprint"], results[0].protocols["mateval-3"].fingerprint);
+        assert!(std::fs::read_to_string(out.join("index.html")).unwrap().contains("votes.html"));
     }
 
     #[test]

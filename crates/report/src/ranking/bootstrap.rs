@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Draws with replacement, each of as many clusters as the results have, from a fixed generator: they are the same on
 /// every machine.
-pub(super) struct Draws {
+pub(crate) struct Draws {
     clusters: usize,
     /// How often each draw holds each cluster, draw by draw.
     counts: Vec<u16>,
@@ -23,11 +23,11 @@ pub(super) struct Draws {
 
 impl Draws {
     /// The largest supported number of clusters.
-    pub(super) const MOST_CLUSTERS: usize = u16::MAX as usize;
+    pub(crate) const MOST_CLUSTERS: usize = u16::MAX as usize;
 
     /// `draws` draws of `clusters` clusters, at most [`Draws::MOST_CLUSTERS`]. The k-th number of a draw follows from
     /// the seed, the draw and k alone.
-    pub(super) fn new(seed: u64, draws: usize, clusters: usize) -> Self {
+    pub(crate) fn new(seed: u64, draws: usize, clusters: usize) -> Self {
         let mut counts = vec![0; draws * clusters];
         for (draw, counts) in counts.chunks_exact_mut(clusters.max(1)).enumerate() {
             for k in 0..clusters {
@@ -41,7 +41,7 @@ impl Draws {
     }
 
     /// Draw by draw, how often it holds each cluster.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &[u16]> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &[u16]> {
         self.counts.chunks_exact(self.clusters.max(1))
     }
 
@@ -244,7 +244,7 @@ pub(super) fn intervals(clusters: &Clusters, draws: &Draws, kind: IntervalKind) 
 }
 
 /// The values below and above which [`TAIL`] of the draws lie.
-fn tails(mut values: Vec<f64>) -> [f64; 2] {
+pub(crate) fn tails(mut values: Vec<f64>) -> [f64; 2] {
     // The k-th of n draws is the quantile k / (n + 1).
     let below = ((values.len() + 1) as f64 * TAIL) as usize;
     let low = below.saturating_sub(1);

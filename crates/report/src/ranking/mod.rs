@@ -16,8 +16,10 @@ use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use rayon::prelude::*;
 
-use self::bootstrap::{DrawTable, Draws};
+use self::bootstrap::DrawTable;
+pub(crate) use self::bootstrap::{Draws, tails};
 use self::file::{LEVEL, RankedMethod, Ranking, RankingRules};
+pub(crate) use self::key_ranking::kendall_tau_b;
 use self::key_ranking::{KeyValues, rank_key};
 use crate::error::{Mismatch, ReportError};
 use crate::titles::shown_method;

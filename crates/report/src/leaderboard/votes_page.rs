@@ -1,0 +1,87 @@
+//! The page on which people vote: pairs of methods' pictures beside the truth, without names. It works from the disk,
+//! and saves what `votes` counts. Which pairs exist is stated here; the script draws their order and sides for each
+//! voter.
+
+use std::collections::BTreeSet;
+
+use minijinja::context;
+use serde::Serialize;
+
+use super::board::Board;
+use super::columns::MethodHead;
+use super::pictures::{ERROR, Kind, TRUTH, kinds_in_order};
+use super::site::{Page, SiteWriter};
+use crate::error::ReportError;
+use crate::votes::{VOTES_FORMAT, VotedMethod};
+
+/// What the script shows, and states in the files that it saves.
+#[derive(Serialize)]
+struct Ballot<'a> {
+    format: &'static str,
+    tool: &'a str,
+    protocol: &'a str,
+    fingerprint: &'a str,
+    /// The folder of the truth's pictures.
+    truth: &'static str,
+    methods: Vec<VotedMethod>,
+    kinds: Vec<Kind>,
+    pictures: Vec<BallotPicture<'a>>,
+}
+
+/// A view of a scene of which the truth and at least two methods have a picture of one kind.
+#[derive(Serialize)]
+struct BallotPicture<'a> {
+    scene: &'a str,
+    view: &'a str,
+    picture: &'a str,
+    /// The ids of these methods.
+    methods: Vec<&'a str>,
+}
+
+/// Writes `votes.html`. Fails where no picture can be voted on. What was made from the truth is no method.
+pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let ranking = board.ranking();
+    let heads: Vec<&MethodHead> = board.heads.iter().filter(|head| !head.oracle).collect();
+    let mut pictures = Vec::new();
+    for scene in &ranking.scenes {
+        for view in board.pictures.views(scene) {
+            let kinds = board.pictures.kinds(TRUTH, scene, view);
+            for picture in kinds.into_iter().filter(|kind| !kind.ends_with(ERROR)) {
+                let has_it = |head: &&&MethodHead| board.pictures.kinds(&head.id, scene, view).contains(&picture);
+                let methods: Vec<&str> = heads.iter().filter(has_it).map(|head| head.id.as_str()).collect();
+                if methods.len() > 1 {
+                    pictures.push(BallotPicture { scene: scene.as_str(), view, picture, methods });
+                }
+            }
+        }
+    }
+    if pictures.is_empty() {
+        return Err(ReportError::NothingToVoteOn);
+    }
+    let is_shown = |id: &str| pictures.iter().any(|picture| picture.methods.contains(&id));
+    let shown = ranking.methods.iter().filter(|method| is_shown(&method.id));
+    let ballot = Ballot {
+        format: VOTES_FORMAT,
+        tool: &board.file.tool,
+        protocol: &ranking.protocol,
+        fingerprint: &ranking.fingerprint,
+        truth: TRUTH,
+        methods: shown
+            .map(|method| VotedMethod {
+                id: method.id.clone(),
+                method: method.method.clone(),
+                submission_sha256: method.submission_sha256.clone(),
+            })
+            .collect(),
+        kinds: kinds_in_order(pictures.iter().map(|picture| picture.picture).collect::<BTreeSet<_>>()),
+        pictures,
+    };
+    site.file("votes.js", include_str!("templates/votes.js"))?;
+    site.page(&Page {
+        file: "votes.html",
+        template: "votes.j2",
+        title: "Which picture is closer to the truth?",
+        scripts: &["votes.js"],
+        values: context! { ballot => serde_json::json!(ballot).to_string() },
+    })
+}
