@@ -21,7 +21,7 @@ use parquet::schema::parser::parse_message_type;
 use serde_json::{Value, json};
 
 use crate::dataset::{
-    ExportError, Exported, SoundDataset, licence_text, make_folder_of, picture, write_file, write_licences,
+    ExportError, Exported, SoundDataset, inert, licence_text, make_folder_of, picture, write_file, write_licences,
 };
 
 /// The Parquet file; its name states the split, and that it is the only one.
@@ -101,12 +101,6 @@ fn card(sound: &SoundDataset, exported: &Exported) -> String {
     }
     text.push_str(COLUMNS);
     text
-}
-
-/// Markdown and HTML of a name are shown, not obeyed.
-fn inert(text: &str) -> String {
-    let plain: String = text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
-    plain.replace('&', "&amp;").replace('<', "&lt;").replace(['`', '[', ']', '*', '_'], " ")
 }
 
 const COLUMNS: &str = "\
