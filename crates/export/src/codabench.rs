@@ -69,10 +69,14 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
         None => usize::MAX,
     };
     let SoundDataset { dataset, mut files } = SoundDataset::open(&of.dataset, Format::Croissant, progress)?;
+    // What a split withholds lies in its private folder, or with the rest.
+    let truth = of.private.as_ref().unwrap_or(&of.dataset);
     let mut withheld = Vec::new();
-    if let Some(private) = &of.private {
-        withheld = manifest::list_files(private)?;
+    if of.private.is_some() {
+        withheld = manifest::list_files(truth)?;
         withheld.retain(|file| file.starts_with("scenes/"));
+    }
+    if truth.join(WITHHELD).is_file() {
         withheld.push(WITHHELD.to_owned());
     }
     files.extend([MANIFEST, DATASET].map(str::to_owned));
@@ -86,8 +90,8 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
         let slice: Vec<SceneId> = slice.iter().map(|id| (*id).clone()).collect();
         let belongs = |file: &&String| !file.starts_with("scenes/") || is_below(file, &slice);
         let reference = out.join(format!("data/reference_{at}"));
-        let private = of.private.iter().flat_map(|root| withheld.iter().map(move |file| (root, file)));
-        for (root, file) in files.iter().map(|file| (&of.dataset, file)).chain(private) {
+        let public = files.iter().map(|file| (&of.dataset, file));
+        for (root, file) in public.chain(withheld.iter().map(|file| (truth, file))) {
             if belongs(&file) {
                 copy_file(&root.join(file), &reference.join(file))?;
             }
@@ -95,8 +99,7 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
         // Truth that is missing, or not that of this dataset, is found here.
         let findings = manifest::check_those(&reference, |file| is_below(file, &slice))?;
         if !findings.is_empty() {
-            let path = of.private.clone().unwrap_or_else(|| of.dataset.clone());
-            return Err(DatasetError::Invalid { path, findings }.into());
+            return Err(DatasetError::Invalid { path: truth.clone(), findings }.into());
         }
     }
     write_program(of, is_hidden(&dataset), &out.join("data/scoring_program"))?;
@@ -203,8 +206,8 @@ fn overview(of: &Competition, dataset: &Dataset) -> String {
     };
     format!(
         "# {}\n\nA method gets a photo of a room and its geometry, and returns a base colour for each object, with \
-         roughness and metallic if it predicts them.\n\n{place} It has {} scenes; the SHA-256 of its manifest is `{}`. \
-         Hand in a .zip of the submission, without a file `metadata` or `metadata.yaml`: `mateval eval lint` checks it \
+         roughness and metallic if it predicts them.\n\n{place} Number of scenes: {}; SHA-256 of its manifest: \
+         `{}`.\n\nHand in a .zip of the submission, without a file `metadata` or `metadata.yaml`: `mateval eval lint` checks it \
          in seconds.\n\n{numbers} Places of this table are those of single numbers; whether two methods differ is not \
          tested here.\n",
         inert(&file.name),
