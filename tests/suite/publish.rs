@@ -200,6 +200,57 @@ fn rounded_results_are_no_oracle() {
     board.ends_with(2).says("mateval-rounded/1");
 }
 
+/// The scoring program of a competition, on the layout that Codabench documents: its files give no more away than
+/// `eval score --rounded`.
+#[test]
+fn a_competition_shows_rounded_numbers_alone() {
+    let out = tempfile::tempdir().unwrap();
+    let [bundle, app, output] = ["bundle", "app", "app/output"].map(|name| out.path().join(name));
+    let export = |dataset: &str, words: &[&Path]| {
+        let mut command = mateval();
+        command.args(["prep", "export", "--as", "codabench", "--image", "example/mateval:1", "--out"]).arg(&bundle);
+        run(command.arg(SPLIT.join(dataset)).args(words))
+    };
+    export("whole", &[]).ends_with(2).says("--with-ground-truth");
+    export("public", &[]).ends_with(2).says("give --private FOLDER");
+    let private = SPLIT.join("private");
+    let limits = ["--seconds-a-scene", "601"].map(Path::new);
+    export("public", &[Path::new("--private"), &private, limits[0], limits[1]]).ends_with(2).says("601 s");
+    assert!(!bundle.exists());
+    export("public", &[Path::new("--private"), &private]).ends_with(0).says("1 task; it holds the truth");
+    assert!(
+        !files_below(&bundle).iter().any(|file| file.ends_with("commitment.secret") || file.ends_with("recipe.toml"))
+    );
+
+    copy_folder(&bundle.join("data/scoring_program"), &app.join("program"));
+    copy_folder(&bundle.join("data/reference_0"), &app.join("input/ref"));
+    run(&mut baseline("median", &SPLIT.join("public"), &app.join("input/res/folder"))).ends_with(0);
+    std::fs::create_dir_all(&output).unwrap();
+    let metadata = std::fs::read_to_string(app.join("program/metadata.yaml")).unwrap();
+    assert_eq!(metadata, "command: sh /app/program/score.sh rounded\n");
+    let paths = std::env::var("PATH").unwrap();
+    let bin = Path::new(env!("CARGO_BIN_EXE_mateval")).parent().unwrap();
+    let mut program = std::process::Command::new("sh");
+    program.env("PATH", format!("{}:{paths}", bin.display())).arg(app.join("program/score.sh")).arg("rounded");
+    let printed = run(program.arg(app.join("input")).arg(&output)).ends_with(0).stdout;
+    assert_eq!((printed.as_str(), files_below(&output).len()), ("", 2));
+
+    let [whole, rounded] = ["whole.json", "rounded.json"].map(|name| out.path().join(name));
+    let mut command = score(&app.join("input/res/folder"), &SPLIT.join("whole"), &whole);
+    run(command.arg("--rounded").arg(&rounded)).ends_with(0);
+    let scores = json(&output.join("scores.json"));
+    let [whole, rounded] = [json(&whole)["protocols"]["mateval-3"]["summary"].clone(), json(&rounded)];
+    let headline = rounded["headline"]["mateval-3"].as_object().unwrap();
+    assert_eq!(scores.as_object().unwrap().len(), headline.len());
+    let page = std::fs::read_to_string(output.join("detailed_results.html")).unwrap();
+    for (key, value) in headline {
+        assert_eq!(scores[key.replace('.', "_")].as_f64(), value.as_f64(), "{key}");
+        let exact = format!("{:.4}", whole[key].as_f64().unwrap());
+        assert!(page.contains(key) && !page.contains(&exact), "{key}");
+    }
+    assert!(!page.contains("<img") && !page.contains("\"instances\""), "{page}");
+}
+
 /// Fault 4: the next step of the guide packed the whole dataset without a word.
 #[test]
 fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {

@@ -70,6 +70,10 @@ pub enum ExportError {
     /// The dataset's pictures were not rendered.
     #[error("'{}' has no pictures of all its views yet; run `mateval prep render DATASET`", path.display())]
     NoPictures { path: PathBuf },
+    #[error(
+        "a scene takes {seconds} s, and a task may take {limit} s; give a longer --limit, which needs an own queue"
+    )]
+    SceneOverLimit { seconds: u32, limit: u32 },
     /// The scene has no such view.
     #[error("'{}' has no view '{view}' of the scene '{scene}'", path.display())]
     NoView {
@@ -189,6 +193,12 @@ pub fn write_licence(dataset: &Dataset, scene: &SceneId, path: &Path) -> Result<
 pub fn write_licences(dataset: &Dataset, out: &Path) -> Result<(), ExportError> {
     let place = |scene: &SceneId| out.join("licences").join(format!("{scene}.txt"));
     dataset.file.scenes.iter().try_for_each(|scene| write_licence(dataset, scene, &place(scene)))
+}
+
+/// Markdown and HTML of a name are shown, not obeyed.
+pub(crate) fn inert(text: &str) -> String {
+    let plain: String = text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
+    plain.replace('&', "&amp;").replace('<', "&lt;").replace(['`', '[', ']', '*', '_'], " ")
 }
 
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {

@@ -1,4 +1,5 @@
-//! A dataset folder for the Hugging Face Hub: a card and a Parquet file with a row a view, in the split `test`.
+//! A dataset folder for the Hugging Face Hub: a card, a Parquet file with a row a view, in the split `test`, and the
+//! description of the benchmark.
 //!
 //! Columns of the Parquet file: `scene`, `view`, `picture` (a PNG file's bytes and its name, as `datasets` stores
 //! pictures), `intrinsics`, `world_from_camera` (row-major) and `licence`. A scene is a row group, so that no more than
@@ -21,13 +22,13 @@ use parquet::schema::parser::parse_message_type;
 use serde_json::{Value, json};
 
 use crate::dataset::{
-    ExportError, Exported, SoundDataset, licence_text, make_folder_of, picture, write_file, write_licences,
+    ExportError, Exported, SoundDataset, inert, licence_text, make_folder_of, picture, write_file, write_licences,
 };
 
 /// The Parquet file; its name states the split, and that it is the only one.
 const VIEWS: &str = "data/test-00000-of-00001.parquet";
 
-/// Writes the card, the Parquet file and the licences to `out`.
+/// Writes the card, the Parquet file, `eval.yaml` and the licences to `out`.
 pub fn export(sound: &SoundDataset, out: &Path, progress: Progress<'_>) -> Result<Exported, ExportError> {
     let scenes = &sound.dataset.scenes;
     let mut exported = Exported { scenes: scenes.len(), views: Some(0), without_picture: 0 };
@@ -54,8 +55,23 @@ pub fn export(sound: &SoundDataset, out: &Path, progress: Progress<'_>) -> Resul
     });
     write_parquet(&path, json!({"info": {"features": features()}}).to_string(), groups)?;
     write_file(&out.join("README.md"), card(sound, &exported).as_bytes())?;
+    write_file(&out.join("eval.yaml"), benchmark(sound).as_bytes())?;
     write_licences(&sound.dataset, out)?;
     Ok(exported)
+}
+
+/// `eval.yaml`, which makes the folder a benchmark on the Hub (<https://huggingface.co/docs/hub/eval-results>): results in
+/// models' folders then name its task, which is a single number.
+fn benchmark(sound: &SoundDataset) -> String {
+    format!(
+        "name: {}\ndescription: {}\nevaluation_framework: mateval\ntasks:\n  - id: albedo_novel_psnr\n    config: default\n    \
+         split: test\n",
+        Value::from(sound.dataset.file.name.as_str()),
+        Value::from(
+            "Materials of the objects of a room, from one photo and the room's geometry. The number is the PSNR of the \
+             albedo in novel views, in dB."
+        )
+    )
 }
 
 /// The columns' types in the words of `datasets`.
@@ -101,12 +117,6 @@ fn card(sound: &SoundDataset, exported: &Exported) -> String {
     }
     text.push_str(COLUMNS);
     text
-}
-
-/// Markdown and HTML of a name are shown, not obeyed.
-fn inert(text: &str) -> String {
-    let plain: String = text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
-    plain.replace('&', "&amp;").replace('<', "&lt;").replace(['`', '[', ']', '*', '_'], " ")
 }
 
 const COLUMNS: &str = "\

@@ -4,9 +4,11 @@
 //!
 //! [`export`] opens and checks the dataset, lists its views with their pictures and licences ([`dataset`]), and passes
 //! them to the format's own file: [`mod@tars`], [`croissant`] (which describes those tars), [`huggingface`], or
-//! [`cameras`] (COLMAP and nerfstudio). [`mitsuba`] writes one view as a scene for Mitsuba 3.
+//! [`cameras`] (COLMAP and nerfstudio). [`mitsuba`] writes one view as a scene for Mitsuba 3, and [`codabench`] a
+//! competition, which holds the truth.
 
 pub mod cameras;
+pub mod codabench;
 pub mod croissant;
 pub mod dataset;
 pub mod huggingface;

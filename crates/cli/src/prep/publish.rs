@@ -3,8 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{Finding, SceneId, Severity, ViewId};
+use mateval_eval::metric::Better;
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::key::ResultKey;
+use mateval_export::codabench::{self, Column, Competition};
 use mateval_export::mitsuba::export_view;
 use mateval_export::{ExportOptions, Exported, Format, croissant, export};
 use mateval_files::work_folder::{check_free, is_inside};
@@ -196,10 +201,11 @@ pub struct ExportArgs {
     #[arg(long)]
     out: PathBuf,
     /// For croissant: the address of the folder where the files will be published; without it their places are
-    /// relative.
+    /// relative. For codabench: where participants download the dataset.
     #[arg(long)]
     url: Option<String>,
-    /// For croissant: the day of publication, as in 2026-11-24.
+    /// For croissant: the day of publication, as in 2026-11-24. For codabench: the day on which the board opens
+    /// [default: at once].
     #[arg(long)]
     date: Option<String>,
     /// For croissant: how to cite the dataset [default: its name, version and hash].
@@ -214,12 +220,32 @@ pub struct ExportArgs {
     /// For mitsuba: samples per pixel [default: the recipe's].
     #[arg(long, requires = "scene", value_parser = samples_parser())]
     samples: Option<u32>,
+    #[command(flatten)]
+    competition: CompetitionArgs,
     /// Pass on the ground truth of a hidden split, too, which is refused otherwise.
     #[arg(long)]
     with_ground_truth: bool,
     /// For mitsuba: replace a folder that already exists.
     #[arg(long, requires = "scene")]
     force: bool,
+}
+
+/// A competition on Codabench.
+#[derive(clap::Args)]
+struct CompetitionArgs {
+    /// For codabench: the image in which submissions are scored, its name and tag on Docker Hub.
+    #[arg(long, required_if_eq("format", "codabench"))]
+    image: Option<String>,
+    /// For codabench: the private folder of the split whose public folder the dataset is.
+    #[arg(long, requires = "image")]
+    private: Option<PathBuf>,
+    /// For codabench: how long a scene takes to score, in seconds, so that the scenes are cut into tasks that keep to
+    /// --limit [default: one task].
+    #[arg(long, requires = "image", value_parser = clap::value_parser!(u32).range(1..))]
+    seconds_a_scene: Option<u32>,
+    /// For codabench: the most seconds that a task may take [default: 600, the most of the shared queue].
+    #[arg(long, requires = "image", value_parser = clap::value_parser!(u32).range(1..))]
+    limit: Option<u32>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -236,12 +262,15 @@ enum FormatName {
     Colmap,
     /// A view with its ground truth as a scene for Mitsuba 3. Exit code 1: Mitsuba cannot express all of it.
     Mitsuba,
+    /// A competition for Codabench, with the truth: a folder to be packed as a .zip.
+    Codabench,
 }
 
 impl ExportArgs {
     /// Exports the dataset and prints what was written.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let format = match (self.format, &self.scene) {
+            (FormatName::Codabench, None) => return self.run_codabench(),
             (FormatName::Mitsuba, Some(scene)) => return self.run_mitsuba(scene),
             (FormatName::Mitsuba, None) => bail!("--as mitsuba writes one scene; give --scene SCENE"),
             (_, Some(_)) => bail!("--scene is for --as mitsuba; the other formats hold the whole dataset"),
@@ -277,6 +306,45 @@ impl ExportArgs {
             ));
         }
         print(&format!("{line}\n"))?;
+        Ok(Outcome::Good)
+    }
+
+    /// Writes a competition and states what holds its truth.
+    fn run_codabench(&self) -> anyhow::Result<Outcome> {
+        let dataset = Dataset::open(&self.dataset)?;
+        dataset.check_may_be_shown(self.with_ground_truth)?;
+        let is_without_truth = |scene: &SceneFile| !dataset.folder(&scene.id).truth().is_dir();
+        if self.competition.private.is_none() && dataset.scenes.iter().any(is_without_truth) {
+            bail!("'{}' has no ground truth, which scores need; give --private FOLDER", self.dataset.display());
+        }
+        let protocol = Protocol::named("mateval-3")?;
+        let column = |key: &ResultKey| {
+            let style = &key.metric.row().style;
+            Column {
+                key: key.to_string(),
+                higher_is_better: key.metric.better() == Better::Higher,
+                digits: style.digits,
+            }
+        };
+        let competition = Competition {
+            dataset: self.dataset.clone(),
+            private: self.competition.private.clone(),
+            out: self.out.clone(),
+            image: self.competition.image.clone().unwrap_or_default(),
+            columns: protocol.headline.iter().map(column).collect(),
+            seconds_a_scene: self.competition.seconds_a_scene,
+            limit: self.competition.limit.unwrap_or(600),
+            url: self.url.clone(),
+            date: self.date.clone(),
+        };
+        let (scenes, tasks) = with_progress(|progress| codabench::export(&competition, progress))
+            .context("cannot write the competition")?;
+        print(&format!(
+            "{}: {}, {}; it holds the truth: upload it, and publish it nowhere\n",
+            self.out.display(),
+            counted(scenes, "scene"),
+            counted(tasks, "task")
+        ))?;
         Ok(Outcome::Good)
     }
 

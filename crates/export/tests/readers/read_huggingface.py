@@ -7,6 +7,7 @@ from pathlib import Path
 
 import datasets
 import numpy as np
+import yaml
 from dataset_views import licences, views
 from huggingface_hub import DatasetCard
 from PIL import Image
@@ -22,6 +23,9 @@ def main(*, dataset: Path, out: Path) -> None:
             "data_files": [{"split": "test", "path": "data/test-00000-of-00001.parquet"}],
         }
     ]
+    benchmark = yaml.safe_load((out / "eval.yaml").read_text())
+    assert set(benchmark) == {"name", "description", "evaluation_framework", "tasks"}, benchmark
+    assert benchmark["tasks"] == [{"id": "albedo_novel_psnr", "config": "default", "split": "test"}], benchmark
     splits = datasets.load_dataset(str(out))
     assert list(splits) == ["test"], splits
     rows = splits["test"]

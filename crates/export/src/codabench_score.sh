@@ -1,0 +1,63 @@
+#!/bin/sh
+# Scores a submission on Codabench: score.sh rounded|whole [INPUT OUTPUT]
+#
+# In: the dataset with its truth in INPUT/ref, the submission in INPUT/res, the board's columns in columns.txt, the
+# command mateval. Out: OUTPUT/scores.json, a number for each column, and OUTPUT/detailed_results.html, a page that loads
+# nothing. Of a hidden split (rounded) neither holds more than `eval score --rounded`, and nothing else is written.
+set -eu
+export LC_ALL=C
+numbers=$1 input=${2:-/app/input} output=${3:-/app/output}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# Archives of a folder hold that folder.
+submission=$input/res
+for folder in "$input"/res/*/; do
+    [ -e "$submission/submission.json" ] || [ ! -e "$folder/submission.json" ] || submission=$folder
+done
+
+if ! mateval eval lint "$submission" --dataset "$input/ref" > "$work/lint.txt"; then
+    cat "$work/lint.txt" >&2
+    echo "the submission was not scored: 'mateval eval lint' finds these errors in it" >&2
+    exit 1
+fi
+mateval eval score "$submission" --dataset "$input/ref" --out "$work/whole.json" --rounded "$work/rounded.json" > /dev/null
+
+# Both files have a number a line; the means over all scenes follow the word.
+case $numbers in
+    rounded) file=rounded.json word=headline ;;
+    whole) file=whole.json word=summary ;;
+esac
+while read -r key; do
+    number=$(sed -n "/\"$word\": {/,\$s/^ *\"$key\": \([-+.0-9e]*\),\{0,1\}\$/\1/p" "$work/$file" | head -n 1)
+    # Codabench keeps at most ten decimals, and its keys have no dots.
+    [ -z "$number" ] || printf '"%s": %.6f\n' "$(echo "$key" | tr . _)" "$number"
+done < "$(dirname "$0")/columns.txt" > "$work/scores"
+[ -s "$work/scores" ] || { echo "the result holds none of the board's numbers" >&2; exit 1; }
+
+as_html() { sed 's/&/\&amp;/g; s/</\&lt;/g'; }
+{
+    echo '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>MatEval</title>'
+    echo '<style>body { font: 16px sans-serif; margin: 1em } pre { overflow: auto } img { max-width: 100% }</style>'
+    echo '<h1>Scores</h1><pre>'
+    if [ "$numbers" = whole ]; then
+        mateval eval tables "$work/whole.json" --format text | as_html
+    else
+        as_html < "$work/rounded.json"
+    fi
+    echo '</pre><h1>Findings about the submission</h1><pre>'
+    as_html < "$work/lint.txt"
+    echo '</pre>'
+    if [ "$numbers" = whole ]; then
+        echo '<h1>Base colours: the truth, then the submission</h1>'
+        mateval eval pictures "$submission" --dataset "$input/ref" --out "$work/pictures" > /dev/null
+        for picture in "$work"/pictures/*-albedo.png; do
+            printf '<h2>%s</h2><img alt="" src="data:image/png;base64,' "$(basename "$picture" -albedo.png | as_html)"
+            base64 -w 0 "$picture"
+            echo '">'
+        done
+    fi
+    echo '</html>'
+} > "$output/detailed_results.html"
+# Last, since a run without scores has failed.
+{ echo '{'; sed '$!s/$/,/' "$work/scores"; echo '}'; } > "$output/scores.json"
