@@ -114,7 +114,7 @@ fn the_dataset_states_what_is_no_good_secret() {
     let findings = room["findings"].to_string();
     assert_eq!(findings.matches("weak_secret").count(), weak.len());
     assert_eq!(scene("original", "room")["redressed"], Value::Null);
-    let living = &scene("first", "living")["source"];
+    let living = scene("first", "living")["source"].clone();
     assert_eq!([&living["states_roughness"], &living["states_metallic"]], [&Value::from(true); 2]);
     run(&mut verify(&BUILT.join("first"))).ends_with(0);
     run(&mut stats(&BUILT.join("first"))).ends_with(0).prints("local contrast");

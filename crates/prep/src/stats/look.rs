@@ -97,7 +97,8 @@ fn add_view(albedo: &Picture<LinearRgb>, valid: &Mask, instances: &Picture<u16>,
                 }
             }
         }
-        near.moments().deviation.powi(2)
+        // What rounding leaves of one colour is no contrast.
+        Some(near.moments().deviation.powi(2)).filter(|variance| *variance > 1e-12).unwrap_or(0.0)
     };
     let [mut fine, mut all] = [0.0; 2];
     for y in 0..height {
