@@ -155,8 +155,8 @@ fn the_public_tree_holds_no_hash_size_or_piece_of_a_withheld_file() {
     assert!(pieces >= 4, "{pieces}");
 }
 
-/// Fault 3: the results of black and of three colours solve for the mean colour of every instance. Rounded ones give
-/// the mean of everything, which is what `median` finds in the photo.
+/// Fault 3: the results of black and of three colours solve for the mean colour of every instance, 25 dB. Rounded ones
+/// give one colour for the whole split.
 #[test]
 fn rounded_results_are_no_oracle() {
     let out = tempfile::tempdir().unwrap();
@@ -194,7 +194,8 @@ fn rounded_results_are_no_oracle() {
     let median = out.path().join("median");
     run(baseline("median", &public, &median).args(["--estimate", "input"])).ends_with(0);
     let honest = shown(&median);
-    assert!(oracle <= honest + 1.5, "the oracle reaches {oracle} dB, the median {honest} dB");
+    // Which has the right brightness, unlike the median of a photo, whose light is not known.
+    assert!(oracle <= honest + 3.0, "the oracle reaches {oracle} dB, the median {honest} dB");
     // A board is made from whole results.
     let board = run(mateval().args(["eval", "leaderboard"]).arg(&rounded).arg("--out").arg(out.path().join("site")));
     board.ends_with(2).says("mateval-rounded/1");
@@ -217,7 +218,7 @@ fn a_competition_shows_rounded_numbers_alone() {
     let limits = ["--seconds-a-scene", "601"].map(Path::new);
     export("public", &[Path::new("--private"), &private, limits[0], limits[1]]).ends_with(2).says("601 s");
     assert!(!bundle.exists());
-    export("public", &[Path::new("--private"), &private]).ends_with(0).says("1 task; it holds the truth");
+    export("public", &[Path::new("--private"), &private]).ends_with(0).prints("1 task; it holds the truth");
     assert!(
         !files_below(&bundle).iter().any(|file| file.ends_with("commitment.secret") || file.ends_with("recipe.toml"))
     );

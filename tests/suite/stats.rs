@@ -64,6 +64,14 @@ Further counts
   different categories        0
     avg. per scene      unknown
 
+True albedo of 1 input view
+                      mean  deviation
+  luminance          0.308      0.280
+  lightness (Oklab)  0.604      0.216
+  chroma (Oklab)     0.043      0.026
+  local contrast     0.045      0.036
+  fine share         0.584      0.000
+
 Objects by super-category
   super-category      objects  share
   Cabinet/Shelf/Desk        0   none
@@ -115,6 +123,14 @@ Further counts
     others               19
   different categories    3
     avg. per scene      3.0    3    3       1
+
+True albedo of 1 input view
+                      mean  deviation
+  luminance          0.308      0.280
+  lightness (Oklab)  0.604      0.216
+  chroma (Oklab)     0.043      0.026
+  local contrast     0.045      0.036
+  fine share         0.584      0.000
 
 Objects by super-category
   super-category                 objects   share

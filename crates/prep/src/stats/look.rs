@@ -130,7 +130,8 @@ pub(super) fn table(look: &LookStats) -> Table {
         line("local contrast", look.local_contrast),
         line("fine share", look.fine_share),
     ];
-    Table { title: format!("True albedo of {} input views", look.views), words: 1, rows }
+    let plural = if look.views == 1 { "" } else { "s" };
+    Table { title: format!("True albedo of {} input view{plural}", look.views), words: 1, rows }
 }
 
 #[cfg(test)]

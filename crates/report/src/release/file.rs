@@ -265,6 +265,10 @@ pub(crate) const NOT_SHOWN: &str = "not shown, since the ground truth is withhel
 pub(crate) fn withhold(file: &mut ReleaseFile, secrecy: Secrecy, commitment: &str) {
     file.withheld = Some(Withheld { secrecy, commitment: commitment.to_owned() });
     file.remake = None;
+    // The counts of the split, whose scenes have no findings.
+    file.stats.dataset.manifest_sha256.clone_from(&file.dataset.manifest_sha256);
+    let per_scene = file.stats.per_scene.iter_mut().map(|scene| &mut scene.counts);
+    per_scene.chain([&mut file.stats.total]).for_each(|counts| counts.findings.clear());
     file.verification.findings.iter_mut().for_each(silence);
     [&mut file.ceiling, &mut file.floor].into_iter().flatten().for_each(only_means);
     for scene in &mut file.scenes {
