@@ -1,10 +1,11 @@
 //! Makes the dataset of a recipe scene by scene, each completely or not at all. A run that was killed is resumed.
 //!
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
-//! reads the source and chooses the input camera, and [`redress`] gives it other materials if the recipe says so; `plan` numbers instances and parts ([`parts`], [`labels`]), reads the
-//! `photo` if the scene has one, converts the materials and places the views (`wide_views`); `pictures` writes what each
-//! view shows, and `refusals` refuses scenes that would become a wrong truth; [`materials`] unwraps every instance and
-//! bakes its material ([`baking`]); meshes and `scene.json` are written here. [`finish`] writes the files of the whole
+//! reads the source and chooses the input camera, and `redress` gives it other materials if the recipe says so; `plan`
+//! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one, converts the materials
+//! and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
+//! become a wrong truth; [`materials`] unwraps every instance and bakes its material ([`baking`]); meshes and
+//! `scene.json` are written here. [`finish`] writes the files of the whole
 //! dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a scene is refused.
 
 pub mod baking;

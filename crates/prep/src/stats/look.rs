@@ -152,7 +152,7 @@ mod tests {
         let [luminance, _, chroma, contrast, fine] = of(|x, _| if x < 32 { 0.2 } else { 0.6 });
         assert!((luminance.mean - 0.4).abs() < 1e-6 && (luminance.deviation - 0.2).abs() < 1e-6);
         assert!(chroma.mean < 1e-3 && contrast.mean < 1e-6 && fine.mean == 0.0, "{chroma:?} {contrast:?}");
-        let checks = |size: usize| of(move |x, y| if (x / size + y / size) % 2 == 0 { 0.2 } else { 0.6 });
+        let checks = |size: usize| of(move |x, y| if (x / size + y / size).is_multiple_of(2) { 0.2 } else { 0.6 });
         let [[.., sharp, finest], [.., coarser]] = [checks(1), checks(8)];
         assert!(sharp.mean > 0.1 && finest.mean > 0.9 && coarser.mean < 0.6, "{sharp:?} {finest:?} {coarser:?}");
     }
