@@ -56,7 +56,7 @@ impl Drop for OpenFolder {
 impl Submission {
     /// Starts a submission to the dataset, open or the path of its folder, in the folder `out`, which must not exist.
     #[new]
-    #[pyo3(signature = (out, dataset, *, method, description=String::new(), url=None, licence=None, cost=None, trained_on=Vec::new(), force=false))]
+    #[pyo3(signature = (out, dataset, *, method, description=String::new(), url=None, licence=None, cost=None, trained_on=None, force=false))]
     #[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         out: PathBuf,
@@ -66,7 +66,7 @@ impl Submission {
         url: Option<String>,
         licence: Option<String>,
         cost: Option<Bound<'_, PyDict>>,
-        trained_on: Vec<String>,
+        trained_on: Option<Vec<String>>,
         force: bool,
     ) -> PyResult<Self> {
         let dataset = opened(dataset)?;
@@ -77,7 +77,7 @@ impl Submission {
             url,
             licence,
             cost: cost.map(|cost| cost_of(&cost)).transpose()?,
-            trained_on,
+            trained_on: trained_on.unwrap_or_default(),
             oracle: false,
             assumed_encodings: std::collections::BTreeMap::new(),
             geometry: dataset.file.perturbation(),

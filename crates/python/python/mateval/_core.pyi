@@ -248,7 +248,7 @@ class Submission:
         url: Optional[str] = None,
         licence: Optional[str] = None,
         cost: Optional[dict[str, Any]] = None,
-        trained_on: Sequence[str] = (),
+        trained_on: Optional[Sequence[str]] = None,
         force: bool = False,
     ) -> Self: ...
     def write(
