@@ -27,7 +27,7 @@ const RULES: &str = include_str!("codabench_terms.md");
 #[derive(Clone, Debug)]
 pub struct Competition {
     pub dataset: PathBuf,
-    /// The private folder of a split whose public folder is `dataset`; none where `dataset` holds its truth.
+    /// The private folder of a split whose public folder is `dataset`; absent if `dataset` holds its truth.
     pub private: Option<PathBuf>,
     pub out: PathBuf,
     /// Name and tag of the image on Docker Hub.

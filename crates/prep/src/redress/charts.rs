@@ -11,7 +11,7 @@ use mateval_procedural::unfolding::{Chart, PartFrame, Triangle};
 const NEAR_M: f64 = 1.5;
 /// The finest texels, in metres.
 const FINEST_M: f64 = 0.0005;
-/// The most texels of a texture, of which gutters and gaps between blocks take a part.
+/// The most texels of a texture, gutters and gaps between blocks included.
 const MOST_TEXELS: f64 = 4e6;
 /// The most texels of a block's side.
 const MOST_SIDE: f64 = 8000.0;
@@ -32,7 +32,7 @@ pub(super) struct Parts<'a> {
     pub(super) texel_m: f64,
 }
 
-/// The side of texels of which two are a pixel of this camera on what is near.
+/// The side of a texel, two to a pixel of this camera on what is near.
 pub(super) fn texel_of(camera: &Camera) -> f64 {
     (NEAR_M / camera.intrinsics.fx / 2.0).max(FINEST_M)
 }

@@ -61,7 +61,7 @@ struct Unit {
 struct Laid {
     mesh: TriangleMesh,
     look: usize,
-    /// None where one value is everywhere.
+    /// Absent if one value is everywhere.
     layout: Option<Layout>,
     material: MaterialIndex,
 }

@@ -1,4 +1,4 @@
-//! What the surfaces of a scene are: how they are redressed, where in the room they are, and of which class their parts.
+//! What the surfaces of a scene are: how they are redressed, where in the room they are, and the classes of their parts.
 //!
 //! 3D-FRONT states roles and classes. Of other sources names are all that is known, in which words are looked for.
 

@@ -161,7 +161,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let result = result("a", &scores(30.0, 0.0));
             json::write(&folder.path().join("a.json"), &result).unwrap();
-            for name in ["keeper", "stranger"] {
+            for name in ["keeper", "author"] {
                 new_key(&folder.path().join(name)).unwrap();
             }
             Self { folder, result }
@@ -198,7 +198,7 @@ mod tests {
         // A pull request brings its own verification, without a signature, and with one of its own.
         case.verify(VERIFICATION_FORMAT, &sha256, true);
         assert_eq!(case.mark().unwrap(), Verified::Claimed);
-        case.sign("stranger");
+        case.sign("author");
         assert_eq!(case.mark().unwrap(), Verified::Claimed);
         case.sign("keeper");
         assert_eq!(case.mark().unwrap(), Verified::Confirmed);

@@ -28,7 +28,7 @@ struct Ballot<'a> {
     pictures: Vec<BallotPicture<'a>>,
 }
 
-/// A view of a scene of which the truth and at least two methods have a picture of one kind.
+/// A view of a scene that the truth and at least two methods show in pictures of one kind.
 #[derive(Serialize)]
 struct BallotPicture<'a> {
     scene: &'a str,
