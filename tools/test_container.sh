@@ -31,11 +31,11 @@ if [ -z "${BASE:-}" ]; then
     if ! images pull --quiet "$BASE" > /dev/null 2>&1; then
         BASE=localhost/debian:12-made-here
         if ! images inspect --type image "$BASE" > /dev/null 2>&1; then
-            [ -d "$work/root/usr" ] || debootstrap --variant=minbase bookworm "$work/root" > "$work/debootstrap.log"
+            [ -d "$work/base/usr" ] || debootstrap --variant=minbase bookworm "$work/base" > "$work/debootstrap.log"
             # What debian:12-slim leaves out, too.
-            (cd "$work/root" && rm -rf usr/share/doc usr/share/man usr/share/info usr/share/locale var/cache/apt var/lib/apt/lists)
+            (cd "$work/base" && rm -rf usr/share/doc usr/share/man usr/share/info usr/share/locale var/cache/apt var/lib/apt/lists)
             base=$(images from scratch)
-            images add --quiet "$base" "$work/root" / > /dev/null
+            images add --quiet "$base" "$work/base" / > /dev/null
             images commit --quiet --rm "$base" "$BASE" > /dev/null
         fi
     fi

@@ -106,12 +106,16 @@ impl Dataset {
         self.file.photo_renderer.as_ref().filter(|_| scene.photo.is_none())
     }
 
+    /// Whether its ground truth is withheld, or meant to be: it is a hidden split, or has redressed scenes.
+    pub fn is_hidden(&self) -> bool {
+        self.file.withheld.is_some() || self.scenes.iter().any(|scene| scene.redressed.is_some())
+    }
+
     /// Fails where the dataset holds a ground truth that is meant to be secret, unless `with_ground_truth`: for work
     /// that copies or shows it. The public part of a hidden split holds none.
     pub fn check_may_be_shown(&self, with_ground_truth: bool) -> Result<(), DatasetError> {
-        let is_hidden = self.file.withheld.is_some() || self.scenes.iter().any(|scene| scene.redressed.is_some());
         let holds_truth = || self.scenes.iter().any(|scene| self.folder(&scene.id).truth().is_dir());
-        if with_ground_truth || !is_hidden || !holds_truth() {
+        if with_ground_truth || !self.is_hidden() || !holds_truth() {
             return Ok(());
         }
         Err(DatasetError::SecretTruth { path: self.root.clone() })

@@ -102,7 +102,7 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
             return Err(DatasetError::Invalid { path: truth.clone(), findings }.into());
         }
     }
-    write_program(of, is_hidden(&dataset), &out.join("data/scoring_program"))?;
+    write_program(of, dataset.is_hidden(), &out.join("data/scoring_program"))?;
     if let Some(shown) = dataset.scenes.first().and_then(|scene| shown_views(&dataset, scene).into_iter().next()) {
         copy_file(&dataset.root.join(shown.picture), &out.join("logo.png"))?;
     }
@@ -120,11 +120,6 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
     Ok((ids.len(), slices.len()))
 }
 
-/// Whether participants may see rounded numbers only.
-fn is_hidden(dataset: &Dataset) -> bool {
-    dataset.file.withheld.is_some() || dataset.scenes.iter().any(|scene| scene.redressed.is_some())
-}
-
 fn write_program(of: &Competition, is_hidden: bool, out: &Path) -> Result<(), ExportError> {
     let numbers = if is_hidden { "rounded" } else { "whole" };
     let columns: String = of.columns.iter().map(|column| format!("{}\n", column.key)).collect();
@@ -136,7 +131,7 @@ fn write_program(of: &Competition, is_hidden: bool, out: &Path) -> Result<(), Ex
 /// `competition.yaml`. Texts are written as JSON strings, which YAML reads as they are.
 fn competition(of: &Competition, dataset: &Dataset, slices: &[&[&SceneId]]) -> String {
     let quoted = |text: &str| Value::from(text).to_string();
-    let is_hidden = is_hidden(dataset);
+    let is_hidden = dataset.is_hidden();
     let (mut tasks, mut indexes) = (String::new(), String::new());
     for (at, slice) in slices.iter().enumerate() {
         let name = if slices.len() == 1 { "All scenes".to_owned() } else { format!("Scenes, part {}", at + 1) };
@@ -200,7 +195,7 @@ fn overview(of: &Competition, dataset: &Dataset) -> String {
         Some(url) => format!("Download the dataset from <{url}>."),
         None => "The organisers state where the dataset can be downloaded.".to_owned(),
     };
-    let numbers = match is_hidden(dataset) {
+    let numbers = match dataset.is_hidden() {
         true => "Scores are rounded to 0.1 dB or to their error, since exact ones give the truth away.",
         false => "The page of a submission shows all of its numbers, and its base colours beside the truth.",
     };

@@ -43,15 +43,17 @@ pub fn sidecar(result: &Path) -> PathBuf {
 
 /// The signature beside a file.
 pub fn signature_of(file: &Path) -> PathBuf {
-    let mut name = file.as_os_str().to_owned();
-    name.push(".minisig");
-    PathBuf::from(name)
+    with_ending(file, ".minisig")
 }
 
 /// The public key beside a secret one.
 pub fn public_of(secret: &Path) -> PathBuf {
-    let mut name = secret.as_os_str().to_owned();
-    name.push(".pub");
+    with_ending(secret, ".pub")
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
     PathBuf::from(name)
 }
 
@@ -209,7 +211,7 @@ mod tests {
         assert_eq!(case.mark().unwrap(), Verified::Claimed);
         case.sign("keeper");
         assert_eq!(case.mark().unwrap(), Verified::Refuted);
-        // The result is.
+        // The result is changed after it was verified.
         case.verify(VERIFICATION_FORMAT, &sha256, true);
         case.sign("keeper");
         std::fs::write(case.path("a.json"), std::fs::read_to_string(case.path("a.json")).unwrap() + " ").unwrap();

@@ -7,6 +7,8 @@ use mateval_eval::protocol::Protocol;
 use mateval_eval::result::key::Views;
 use minijinja::context;
 use minijinja::value::Serde;
+use pulldown_cmark::html::push_html;
+use pulldown_cmark::{Event, Parser, Tag};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -45,7 +47,7 @@ pub(super) fn write(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWr
 /// Writes `about.html`: what the keeper says, and what holds for every board.
 fn write_about(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let mut said = String::new();
-    pulldown_cmark::html::push_html(&mut said, pulldown_cmark::Parser::new(plan.about.unwrap_or_default()));
+    push_html(&mut said, Parser::new(plan.about.unwrap_or_default()).map(harmless));
     let withheld = board.results.first().and_then(|result| result.dataset.withheld).map(Secrecy::text);
     let count = |state| plan.verified.iter().filter(|mark| **mark == state).count();
     site.page(&Page {
@@ -58,6 +60,22 @@ fn write_about(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<
             verified => count(Verified::Confirmed), claimed => count(Verified::Claimed) + count(Verified::Stale),
         },
     })
+}
+
+/// Markdown without what a script could hide in: the text may come with a pull request. HTML is shown as text,
+/// links lead to web pages and mail alone, and no picture is loaded, since a site loads nothing from elsewhere.
+fn harmless(event: Event<'_>) -> Event<'_> {
+    let is_safe = |url: &str| ["https://", "http://", "mailto:"].iter().any(|start| url.starts_with(start));
+    match event {
+        Event::Html(text) | Event::InlineHtml(text) => Event::Text(text),
+        Event::Start(Tag::Link { link_type, dest_url, title, id }) if !is_safe(&dest_url) => {
+            Event::Start(Tag::Link { link_type, dest_url: "".into(), title, id })
+        }
+        Event::Start(Tag::Image { link_type, title, id, .. }) => {
+            Event::Start(Tag::Image { link_type, dest_url: "".into(), title, id })
+        }
+        other => other,
+    }
 }
 
 #[derive(Serialize)]
@@ -225,6 +243,24 @@ mod tests {
     use super::*;
 
     /// The first row of Table III; Table II has more rows than the others.
+    #[test]
+    fn a_text_about_the_board_runs_nothing_and_loads_nothing() {
+        let html = |text: &str| {
+            let mut html = String::new();
+            push_html(&mut html, Parser::new(text).map(harmless));
+            html
+        };
+        let hostile = "<script>a()</script>\n\nb <img src=x onerror=c()> [d](javascript:e) ![f](https://g/h.png)";
+        let shown = html(hostile);
+        assert!(
+            !shown.contains("<script") && !shown.contains("<img src=x") && !shown.contains("javascript:"),
+            "{shown}"
+        );
+        assert!(!shown.contains("https://g"), "{shown}");
+        // Twin.
+        assert!(html("[paper](https://e.org/a)").contains("<a href=\"https://e.org/a\">paper</a>"));
+    }
+
     #[test]
     fn the_papers_numbers() {
         let page = paper_page();

@@ -324,7 +324,7 @@ pub(super) fn triple(text: &str) -> Result<[f64; 3], Invalid> {
         [a, b, c] => Ok([a, b, c]),
         ref other => {
             let Invalid(message) = wrong_count("1 or 3", other.len());
-            // `0,5 0,2 0,1` is six numbers: a comma parts each two that belong together.
+            // `0,5 0,2 0,1` is six numbers: a comma stands inside each number.
             let are_commas = 2 * text.split_whitespace().count() == other.len() && text.contains(',');
             let hint = if are_commas { "; write points in place of decimal commas" } else { "" };
             Err(Invalid(format!("{message}{hint}")))
