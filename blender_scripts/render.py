@@ -18,7 +18,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy  # noqa: E402 (the folder of this file must come first)
-from mateval.cycles import light_passes, render_to, set_up  # noqa: E402
+from mateval.cycles import light_passes, render_to, set_device, set_up  # noqa: E402
 from mateval.denoise import denoise_to  # noqa: E402
 from mateval.job import RESULT_FORMAT, Job, read_job, write_result  # noqa: E402
 from mateval.scene import BuiltScene  # noqa: E402
@@ -34,6 +34,8 @@ def main() -> None:
     result: Job = {
         "format": RESULT_FORMAT,
         "blender": bpy.app.version_string,
+        "device": None,
+        "remark": None,
         "approximations": [],
         "views": [],
         "error": None,
@@ -77,6 +79,7 @@ def carry_out(*, path: Path, result: Job) -> None:
     built = BuiltScene(job=job, folder=folder)
     result["approximations"] = built.approximations
     set_up(scene=built.scene, job=job)
+    result["device"], result["remark"] = set_device(scene=built.scene, job=job)
     built.show_geometry()
     for view in job["views"]:
         report(f"view {view['id']} geometry")

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import bpy
 
+from mateval import devices
 from mateval.job import Job, group_name
 from mateval.materials import BASE_COLOR, INSTANCE, PART
 
 
 def set_up(*, scene: bpy.types.Scene, job: Job) -> None:
-    """Sets up Cycles on the CPU, without clamping, filtering, guiding or denoising, and one file of 32-bit passes."""
+    """Sets up Cycles without clamping, filtering, guiding or denoising, and one file of 32-bit passes."""
     render = scene.render
     render.engine = "CYCLES"
     render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
@@ -24,7 +25,6 @@ def set_up(*, scene: bpy.types.Scene, job: Job) -> None:
         render.threads_mode = "FIXED"
         render.threads = job["threads"]
     cycles = scene.cycles
-    cycles.device = "CPU"
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.use_guiding = False
@@ -48,6 +48,21 @@ def set_up(*, scene: bpy.types.Scene, job: Job) -> None:
     for kind in ("diffuse", "glossy", "transmission", "volume"):
         setattr(cycles, f"{kind}_bounces", bounces)
     add_passes(layer=scene.view_layers[0])
+
+
+def set_device(*, scene: bpy.types.Scene, job: Job) -> tuple[dict | None, str | None]:
+    """Chooses the device that renders. Returns it, or None for the processor, and a remark for the user."""
+    # The denoiser stays on the processor, so that it denoises the same pictures to the same bytes.
+    scene.render.compositor_device = "CPU"
+    scene.render.compositor_denoise_device = "CPU"
+    device, remark = devices.choose(
+        preferences=bpy.context.preferences.addons["cycles"].preferences,
+        wanted=job["device"],
+        required=job["required_device"],
+        turn=job["turn"],
+    )
+    scene.cycles.device = "CPU" if device is None else "GPU"
+    return device, remark
 
 
 def add_passes(*, layer: bpy.types.ViewLayer) -> None:

@@ -20,6 +20,7 @@ from mateval.baking_job import (  # noqa: E402 (the folder above must come first
 )
 from mateval.baking_job import read_job as read_baking_job  # noqa: E402
 from mateval.camera import lens  # noqa: E402
+from mateval.devices import KINDS, choose, driver  # noqa: E402
 from mateval.environment import blender_from_world  # noqa: E402
 from mateval.job import JobError, light_of_world, lights_of_surfaces, read_job, read_numbers, write_result  # noqa: E402
 from mateval.metal import EDGE_COSINE, edge_tint, reflectance  # noqa: E402
@@ -214,6 +215,80 @@ class Fresnel(unittest.TestCase):
             self.assertAlmostEqual(scale / (1.0 - inner), 1.0, places=2)
         scale, inner = base_under_coat(eta=1.5, nonlinear=True)
         self.assertLess(0.5 * scale / (1.0 - 0.5 * inner), 0.3)
+
+
+class Card:
+    """A device as Cycles lists it."""
+
+    def __init__(self, *, kind: str, number: int) -> None:
+        self.type, self.id, self.name, self.use = kind, f"{kind}_{number}", f"{kind} card {number}", True
+
+
+class Preferences:
+    """The preferences of Cycles on a machine with these cards, of a build that knows no oneAPI."""
+
+    def __init__(self, *, cards: dict[str, int]) -> None:
+        self.devices = [Card(kind=kind, number=number) for kind, count in cards.items() for number in range(count)]
+        self.devices.append(Card(kind="CPU", number=0))
+        self.compute_device_type = "NONE"
+
+    def get_devices_for_type(self, kind: str) -> list[Card]:
+        if kind == "ONEAPI":
+            raise TypeError("enum 'ONEAPI' not found")
+        return [device for device in self.devices if device.type in (kind, "CPU")]
+
+
+class Devices(unittest.TestCase):
+    """The choice of the device that renders."""
+
+    def chosen(self, *, cards: dict[str, int], wanted: str, required: str | None = None, turn: int = 0) -> tuple:
+        """The device that was chosen, the devices that then render, and the remark."""
+        preferences = Preferences(cards=cards)
+        device, remark = choose(preferences=preferences, wanted=wanted, required=required, turn=turn)
+        used = [listed.id for listed in preferences.devices if listed.use]
+        self.assertEqual(preferences.compute_device_type, "NONE" if device is None else device["kind"].upper())
+        return device and device["name"], used, remark
+
+    def test_one_card_renders_alone_and_processes_take_turns(self) -> None:
+        cards = {"CUDA": 2, "OPTIX": 2}
+        self.assertEqual(self.chosen(cards=cards, wanted="auto"), ("OPTIX card 0", ["OPTIX_0"], None))
+        self.assertEqual(self.chosen(cards=cards, wanted="auto", turn=3), ("OPTIX card 1", ["OPTIX_1"], None))
+        self.assertEqual(self.chosen(cards=cards, wanted="cuda", turn=2), ("CUDA card 0", ["CUDA_0"], None))
+        self.assertEqual(self.chosen(cards={"HIP": 1}, wanted="auto")[0], "HIP card 0")
+
+    def test_the_processor_is_taken_with_a_message_where_there_is_no_card(self) -> None:
+        device, _, remark = self.chosen(cards={}, wanted="auto")
+        self.assertIsNone(device)
+        self.assertIn("found no graphics card (devices found: optix 0, cuda 0, hip 0, oneapi 0, metal 0)", remark)
+        self.assertEqual(self.chosen(cards={"CUDA": 1}, wanted="cpu")[::2], (None, None))
+
+    def test_a_kind_that_is_absent_is_refused(self) -> None:
+        for kind in KINDS:
+            other = "CUDA" if kind != "CUDA" else "HIP"
+            with self.assertRaises(JobError) as caught:
+                self.chosen(cards={other: 1}, wanted=kind.lower())
+            self.assertIn(f"no device of the kind {kind.lower()}", str(caught.exception))
+            self.assertIn(f"{other.lower()} 1", str(caught.exception))
+        with self.assertRaises(JobError):
+            self.chosen(cards={"CUDA": 1}, wanted="gpu")
+
+    def test_views_of_one_scene_come_from_one_kind(self) -> None:
+        cards = {"CUDA": 1, "OPTIX": 1}
+        self.assertEqual(self.chosen(cards=cards, wanted="auto", required="cuda")[0], "CUDA card 0")
+        device, _, remark = self.chosen(cards=cards, wanted="auto", required="cpu")
+        self.assertIsNone(device)
+        self.assertIn("rendered on the processor", remark)
+        with self.assertRaises(JobError) as caught:
+            self.chosen(cards=cards, wanted="auto", required="hip")
+        self.assertIn("other views of this scene", str(caught.exception))
+
+    def test_the_driver_is_stated_where_the_system_does(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "version"
+            self.assertIsNone(driver(kind="OPTIX", file=file))
+            file.write_text("NVRM version: NVIDIA UNIX x86_64 Kernel Module  550.54.15  Tue Mar  5\n", encoding="utf-8")
+            self.assertEqual(driver(kind="OPTIX", file=file), "550.54.15")
+            self.assertIsNone(driver(kind="HIP", file=file))
 
 
 if __name__ == "__main__":

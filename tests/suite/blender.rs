@@ -211,6 +211,32 @@ fn blenders_own_errors_are_reported() {
     assert!(whole.stdout.contains("2 views rendered"), "{}", whole.stdout);
 }
 
+/// On a machine without a graphics card. The choice among several is tested in `blender_scripts/tests`.
+#[test]
+fn a_device_that_is_absent_is_named_and_views_of_two_devices_never_meet() {
+    let Some((python, _turn)) = blender() else { return };
+    let copy = unrendered();
+    let on = |device: &str| {
+        let mut command = by_blender(copy.path(), &python, &["--device", device]);
+        // A machine with a card is made one without.
+        run(command.env("CUDA_VISIBLE_DEVICES", "").env("HIP_VISIBLE_DEVICES", "-1"))
+    };
+    fails(on("optix"), &["no device of the kind optix", "choose another --device"]);
+    let whole = on("auto").ends_with(0).says("--device auto rendered on the processor: Cycles found no graphics card");
+    assert!(whole.stdout.contains("2 views rendered"), "{}", whole.stdout);
+    let file = renders(copy.path()).join("input/render.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(!text.contains("device"), "{text}");
+    let card = "\"device\": { \"kind\": \"hip\", \"name\": \"a card\", \"driver\": null },\n  \"samples_each_half\"";
+    std::fs::write(&file, text.replace("\"samples_each_half\"", card)).unwrap();
+    fails(on("auto"), &["no device of the kind hip", "other views of this scene were rendered by it"]);
+    let again = on("cpu").ends_with(0);
+    assert!(again.stdout.contains("1 view rendered, 1 kept"), "{}", again.stdout);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), text);
+    let mut builtin = render(copy.path(), 2);
+    run(builtin.args(["--device", "cuda"])).ends_with(2).says("--renderer blender");
+}
+
 #[test]
 fn without_a_blender_it_says_what_to_do() {
     let copy = copied_dataset();

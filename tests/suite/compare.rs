@@ -132,6 +132,7 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
         let render = RenderFile {
             renderer: RendererKind::Blender.id(),
             renderer_version: None,
+            device: None,
             samples_each_half: samples,
             seeds: [71, 72].map(|seed| format!("{seed:016x}")),
             max_bounces: settings.max_bounces,

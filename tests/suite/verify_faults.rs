@@ -143,7 +143,7 @@ fn json_files() {
             },
         },
     ];
-    check_all(&faults, true, 6);
+    check_all(&faults, true, 7);
 }
 
 #[test]
@@ -372,6 +372,15 @@ fn ground_truth() {
             },
         },
         Fault {
+            what: "a view that another device rendered",
+            expected: ("mixed_devices", "scenes/room/ground_truth/renders/builtin/up_left/render.json"),
+            plant: |root| {
+                edit_json(&Room::of(root).file("ground_truth/renders/builtin/up_left/render.json"), |file| {
+                    file["device"] = serde_json::json!({"kind": "cuda", "name": "a card", "driver": null});
+                });
+            },
+        },
+        Fault {
             what: "a missing render",
             expected: ("unreadable", "scenes/room/ground_truth/renders/builtin/down_right/rgb_b.exr"),
             plant: |root| {
@@ -379,5 +388,5 @@ fn ground_truth() {
             },
         },
     ];
-    check_all(&faults, true, 6);
+    check_all(&faults, true, 7);
 }

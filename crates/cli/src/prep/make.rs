@@ -15,7 +15,7 @@ use mateval_prep::build::finish::finish_again;
 use mateval_prep::build::upgrade::bring_up_to_date;
 use mateval_prep::perturb::{PerturbOptions, PerturbedScene, perturb};
 use mateval_prep::recipe::MOST_SAMPLES;
-use mateval_prep::render::{BlenderOptions, BlenderProgram, RenderOptions, Renderer, RendererKind};
+use mateval_prep::render::{BlenderOptions, BlenderProgram, DeviceChoice, RenderOptions, Renderer, RendererKind};
 use mateval_prep::survey::rules::{RejectionLists, SelectionRules};
 use mateval_prep::survey::selection::SelectionGoal;
 use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, survey};
@@ -244,7 +244,10 @@ pub struct BlenderArgs {
     /// `mateval fetch blender` installed].
     #[arg(long, value_name = "PATH")]
     blender: Option<PathBuf>,
-    /// Number of scenes that Blender renders at once.
+    /// The device that Blender renders on. All views of a scene come from one kind of device.
+    #[arg(long, value_parser = device_parser(), default_value = "cpu")]
+    device: DeviceChoice,
+    /// Number of scenes that Blender renders at once, each on a graphics card of its own where there are several.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     jobs: u16,
     /// Longest time that Blender may take for a scene, in seconds.
@@ -260,7 +263,14 @@ pub struct BlenderArgs {
 
 /// The Blender at this path, or else the usual one; absent if no path is given and none is installed.
 pub fn find_blender(path: Option<PathBuf>) -> anyhow::Result<Option<BlenderOptions>> {
-    let arguments = BlenderArgs { blender: path, jobs: 1, time_limit: 7200, memory_limit: 16, attempts: 1 };
+    let arguments = BlenderArgs {
+        blender: path,
+        device: DeviceChoice::Cpu,
+        jobs: 1,
+        time_limit: 7200,
+        memory_limit: 16,
+        attempts: 1,
+    };
     match arguments.options() {
         Ok(options) => Ok(Some(options)),
         Err(error) if arguments.is_given() => Err(error),
@@ -272,6 +282,7 @@ impl BlenderArgs {
     /// How Blender is run; fails where it cannot be found.
     pub fn options(&self) -> anyhow::Result<BlenderOptions> {
         let mut options = BlenderOptions::new(BlenderProgram(self.program()?));
+        options.device = self.device;
         options.jobs = usize::from(self.jobs);
         options.attempts = self.attempts;
         options.limits.time = Duration::from_secs(u64::from(self.time_limit));
@@ -353,6 +364,11 @@ pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
     word_parser(RendererKind::ALL, |kind| (kind.word(), kind.summary()))
 }
 
+/// Reads a device's word; the help lists every device with its summary.
+fn device_parser() -> impl TypedValueParser<Value = DeviceChoice> {
+    word_parser(DeviceChoice::ALL, |device| (device.word(), device.summary()))
+}
+
 /// Reads a number of samples, as large as a recipe's may be.
 pub fn samples_parser() -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(1..=i64::from(MOST_SAMPLES))
@@ -361,6 +377,11 @@ pub fn samples_parser() -> impl TypedValueParser<Value = u32> {
 /// The renderer with its options. For Blender, fails if it cannot be found, or is a module that cannot be imported.
 pub fn checked_renderer(kind: RendererKind, blender: &BlenderArgs) -> anyhow::Result<Renderer> {
     Ok(match kind {
+        RendererKind::Builtin if blender.device != DeviceChoice::Cpu => bail!(
+            "--device {} is for Blender alone, and the renderer is '{kind}', which runs on the processor; add \
+             --renderer blender, or leave out --device",
+            blender.device
+        ),
         RendererKind::Builtin => Renderer::Builtin,
         RendererKind::Blender => {
             let options = blender.options()?;

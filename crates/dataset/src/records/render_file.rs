@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::changes::SceneHashes;
 use crate::layout::{WHOLE_SCENE, is_input_picture, is_rendered};
-use crate::{DatasetError, RendererId, SceneId, ViewId};
+use crate::{DatasetError, RendererId, SceneId, ViewId, word_enum};
 use mateval_files::untrusted::sha256_of_bytes;
 
 /// The name of the file. It is written last, so its presence means that a view's pictures are complete.
@@ -24,6 +24,9 @@ pub struct RenderFile {
     pub renderer: RendererId,
     /// The renderer's own version; null for `builtin`, whose version is that of the dataset's tool.
     pub renderer_version: Option<String>,
+    /// The graphics card that rendered; absent where the processor did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<RenderDevice>,
     /// Samples per pixel of each of the two halves.
     pub samples_each_half: u32,
     /// Seeds of `rgb_a` and `rgb_b`, 16 hexadecimal digits each.
@@ -39,6 +42,41 @@ pub struct RenderFile {
     pub noise: RenderNoise,
     /// What the renderer only approximates of the source's meaning, one line per material.
     pub approximations: Vec<String>,
+}
+
+word_enum! {
+    /// The way in which Cycles uses a graphics card. `auto` takes the first one that has a card.
+    DeviceKind, a "kind of device":
+    /// NVIDIA's, with its ray-tracing cores.
+    Optix = "optix",
+    /// NVIDIA's.
+    Cuda = "cuda",
+    /// AMD's.
+    Hip = "hip",
+    /// Intel's.
+    Oneapi = "oneapi",
+    /// Apple's.
+    Metal = "metal",
+}
+
+/// A graphics card that rendered. Pictures of two kinds of devices differ by more than noise, so all views of a scene
+/// come from one kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RenderDevice {
+    pub kind: DeviceKind,
+    /// The card's name, as its driver states it.
+    pub name: String,
+    /// Version of the driver; null where the system does not state it.
+    pub driver: Option<String>,
+}
+
+impl std::fmt::Display for RenderDevice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({}", self.name, self.kind)?;
+        self.driver.iter().try_for_each(|driver| write!(f, ", driver {driver}"))?;
+        f.write_str(")")
+    }
 }
 
 /// How noisy a picture is: means over all pixels and channels, linear, before exposure.

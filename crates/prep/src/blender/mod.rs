@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::material::Material;
 use mateval_dataset::reference::{LightGroup, ReferenceScene, Surface};
-use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json};
+use mateval_dataset::render_file::{DeviceKind, RenderDevice};
+use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json, word_enum};
 use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture, Wrap};
@@ -21,6 +22,45 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::error::PrepError;
+
+word_enum! {
+    /// The device that Blender renders on.
+    DeviceChoice, a "device":
+    /// The processor.
+    Cpu = "cpu",
+    /// The first kind of graphics card of this list that Cycles finds, else the processor.
+    Auto = "auto",
+    /// As [`DeviceKind::Optix`].
+    Optix = "optix",
+    /// As [`DeviceKind::Cuda`].
+    Cuda = "cuda",
+    /// As [`DeviceKind::Hip`].
+    Hip = "hip",
+    /// As [`DeviceKind::Oneapi`].
+    Oneapi = "oneapi",
+    /// As [`DeviceKind::Metal`].
+    Metal = "metal",
+}
+
+impl DeviceChoice {
+    /// What the device is, in one sentence for a help text.
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Cpu => "The processor",
+            Self::Auto => "The first of those below of which there is one, else the processor, with a message",
+            Self::Optix => "An NVIDIA card with its ray-tracing cores",
+            Self::Cuda => "An NVIDIA card",
+            Self::Hip => "An AMD card",
+            Self::Oneapi => "An Intel card",
+            Self::Metal => "An Apple card",
+        }
+    }
+
+    /// Whether pictures that `device` rendered (none: the processor) are what this choice asks for.
+    pub fn accepts(self, device: Option<&RenderDevice>) -> bool {
+        self == Self::Auto || device.map_or("cpu", |device| device.kind.word()) == self.word()
+    }
+}
 
 /// A folder with a job that is ready to run.
 #[derive(Debug)]
@@ -134,6 +174,13 @@ pub struct BlenderJob {
     pub max_bounces: u32,
     /// Number of threads to render with; 0 for one per processor.
     pub threads: u32,
+    /// The device that renders: `cpu`, `auto`, or a kind of graphics card.
+    pub device: DeviceChoice,
+    /// What has rendered other views of the scene, which `auto` must take again: `cpu` or a kind of graphics card; null
+    /// where nothing has.
+    pub required_device: Option<String>,
+    /// The position of this process among those that run at once, which take different cards.
+    pub turn: u32,
 }
 
 /// The schema of `reference.json` defines what a material is.
@@ -191,6 +238,10 @@ pub struct BlenderResult {
     pub format: String,
     /// Blender's version.
     pub blender: String,
+    /// The graphics card that renders; null for the processor.
+    pub device: Option<RenderDevice>,
+    /// What a user should know about the choice of the device.
+    pub remark: Option<String>,
     /// What Blender only approximates of the job, one line per material.
     pub approximations: Vec<String>,
     /// The views whose pictures are complete.
@@ -224,6 +275,11 @@ pub struct JobPlan<'a> {
     pub max_bounces: u32,
     /// Number of threads; 0 for one per processor.
     pub threads: u32,
+    pub device: DeviceChoice,
+    /// What has rendered other views of the scene: `None` for nothing, `Some(None)` for the processor.
+    pub required_device: Option<Option<DeviceKind>>,
+    /// The position of this process among those that run at once.
+    pub turn: u32,
 }
 
 /// Writes the job into the folder, which must exist.
@@ -247,6 +303,9 @@ fn write_job(folder: &Path, plan: &JobPlan<'_>) -> Result<(), PrepError> {
         samples_each_half: plan.samples_each_half,
         max_bounces: plan.max_bounces,
         threads: plan.threads,
+        device: plan.device,
+        required_device: plan.required_device.map(|kind| kind.map_or("cpu", DeviceKind::word).to_owned()),
+        turn: plan.turn,
     };
     Ok(json::write(&folder.join("job.json"), &job)?)
 }

@@ -4,21 +4,21 @@
 //! source's textures. `instances.glb` and `parts.glb` serve only to find the part of each triangle; baked textures are
 //! not used.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::SceneFolder;
-use mateval_dataset::render_file::RenderFile;
-use mateval_dataset::render_file::RenderNoise;
+use mateval_dataset::render_file::{DeviceKind, RenderFile, RenderNoise};
 use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, reference};
 use mateval_files::FileError;
 
 use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
 use crate::blender::{
-    BlenderEvent, BlenderLimits, BlenderProgram, BlenderResult, BlenderView, JobFolder, JobPlan, JobView, tail,
+    BlenderEvent, BlenderLimits, BlenderProgram, BlenderResult, BlenderView, DeviceChoice, JobFolder, JobPlan, JobView,
+    tail,
 };
 use crate::error::PrepError;
 use crate::scene_meshes;
@@ -35,21 +35,22 @@ const SEEDS: u64 = 1 << 31;
 pub struct BlenderOptions {
     pub program: BlenderProgram,
     pub limits: BlenderLimits,
-    /// Number of scenes rendered at once.
+    pub device: DeviceChoice,
+    /// Number of scenes rendered at once. Each process renders on one graphics card, and they take turns.
     pub jobs: usize,
     /// How often Blender is run for a scene before the scene counts as failed.
     pub attempts: u32,
 }
 
 impl BlenderOptions {
-    /// One scene at a time and two attempts, each of two hours and 16 GiB at most.
+    /// One scene at a time on the processor and two attempts, each of two hours and 16 GiB at most.
     pub fn new(program: BlenderProgram) -> Self {
         let limits = BlenderLimits {
             time: Duration::from_secs(2 * 3600),
             silence: Duration::from_secs(15 * 60),
             memory_bytes: 16 << 30,
         };
-        Self { program, limits, jobs: 1, attempts: 2 }
+        Self { program, limits, device: DeviceChoice::Cpu, jobs: 1, attempts: 2 }
     }
 }
 
@@ -63,21 +64,22 @@ pub(super) fn render_scenes(
 ) -> Result<RenderReport, PrepError> {
     let queue: Mutex<VecDeque<usize>> = Mutex::new((0..scenes.len()).collect());
     let done: Mutex<Vec<(usize, Result<RenderReport, PrepError>)>> = Mutex::new(Vec::new());
-    let work = || {
+    let work = |turn: u32| {
         // A panic of another thread leaves the queue and the list in a valid state.
         let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front();
         while let Some(at) = next() {
             let finished = done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).len();
             progress(Report::part(&format!("scene {}", scenes[at]), finished, scenes.len()));
-            let scene = BlenderScene { run, options, id: scenes[at], progress };
+            let scene = BlenderScene { run, options, id: scenes[at], turn, progress };
             done.lock()
                 .unwrap_or_else(std::sync::PoisonError::into_inner)
                 .push((at, run.on_scene(scenes[at], || scene.render())));
         }
     };
     std::thread::scope(|scope| {
-        for _ in 0..options.jobs.clamp(1, scenes.len().max(1)) {
-            scope.spawn(work);
+        for turn in 0..options.jobs.clamp(1, scenes.len().max(1)) as u32 {
+            let work = &work;
+            scope.spawn(move || work(turn));
         }
     });
     let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -86,6 +88,9 @@ pub(super) fn render_scenes(
     for (_, report) in done {
         all.add(report?);
     }
+    // What concerns the device is the same for every scene.
+    let mut said = BTreeSet::new();
+    all.remarks.retain(|remark| said.insert(remark.clone()));
     remove_if_empty(run.root.join(WORK));
     Ok(all)
 }
@@ -95,6 +100,8 @@ struct BlenderScene<'a> {
     run: &'a RenderRun<'a>,
     options: &'a BlenderOptions,
     id: &'a SceneId,
+    /// The position of this thread among those that render at once.
+    turn: u32,
     progress: Progress<'a>,
 }
 
@@ -103,7 +110,7 @@ impl BlenderScene<'_> {
         let folder = SceneFolder::of(self.run.root, self.id);
         let scene: SceneFile = json::read(&folder.scene_file())?;
         let mut report = RenderReport::default();
-        let mut views = self.views_to_render(&folder, &scene);
+        let (mut views, mut required_device) = self.views_to_render(&folder, &scene);
         report.kept = scene.views.len() - views.len();
         if views.is_empty() {
             return Ok(report);
@@ -124,11 +131,21 @@ impl BlenderScene<'_> {
                 samples_each_half: self.run.samples,
                 max_bounces: MAX_BOUNCES,
                 threads: self.threads(),
+                device: self.options.device,
+                required_device,
+                turn: self.turn,
             };
             let job = JobFolder::prepare(&work, &plan)?;
             let before = views.len();
             failure = self.attempt(&job, &folder, &scene, &mut views).err();
             report.rendered += before - views.len();
+            if let Some(result) = job.result().ok().flatten() {
+                if before > views.len() {
+                    required_device = Some(result.device.as_ref().map(|device| device.kind));
+                    report.remarks.extend(result.device.map(|device| format!("rendered on {device}")));
+                }
+                report.remarks.extend(result.remark);
+            }
             let Some(failure) = &failure else { break };
             report.remarks.push(format!("scene '{}': attempt {attempt} failed: {}", self.id, failure.what));
         }
@@ -139,14 +156,28 @@ impl BlenderScene<'_> {
         Ok(report)
     }
 
-    fn views_to_render(&self, folder: &SceneFolder, scene: &SceneFile) -> Vec<JobView> {
-        let is_missing = |view: &&View| !self.run.is_done(folder, view, &seed_texts(self.seeds(view)));
-        let job_view = |view: &View| JobView {
-            id: view.id.clone(),
-            camera: view.camera,
-            seeds: self.seeds(view).map(|seed| u32::try_from(seed).expect("seeds are below 2^31")),
-        };
-        scene.views.iter().filter(is_missing).map(job_view).collect()
+    /// The views to render, and what has rendered the others: `None` for nothing, `Some(None)` for the processor.
+    fn views_to_render(&self, folder: &SceneFolder, scene: &SceneFile) -> (Vec<JobView>, Option<Option<DeviceKind>>) {
+        let device = self.options.device;
+        let mut kept: Option<Option<DeviceKind>> = None;
+        let mut views = Vec::new();
+        for view in &scene.views {
+            let seeds = self.seeds(view);
+            let found = self.run.done(folder, view, &seed_texts(seeds)).map(|file| file.device);
+            // Where an earlier run was asked for another kind and ended early, the first kept view decides.
+            let is_of_kept = |kind| kept.is_none_or(|kept| kept == kind);
+            match found {
+                Some(found) if device.accepts(found.as_ref()) && is_of_kept(found.as_ref().map(|found| found.kind)) => {
+                    kept = Some(found.map(|found| found.kind));
+                }
+                _ => views.push(JobView {
+                    id: view.id.clone(),
+                    camera: view.camera,
+                    seeds: seeds.map(|seed| u32::try_from(seed).expect("seeds are below 2^31")),
+                }),
+            }
+        }
+        (views, kept)
     }
 
     fn seeds(&self, view: &View) -> [u64; 2] {
@@ -226,6 +257,7 @@ impl BlenderScene<'_> {
         let file = RenderFile {
             renderer: self.run.renderer.clone(),
             renderer_version: Some(result.blender.clone()),
+            device: result.device.clone(),
             samples_each_half: self.run.samples,
             seeds: seed_texts(view.seeds.map(u64::from)),
             max_bounces: MAX_BOUNCES,

@@ -26,7 +26,7 @@ use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, RenderSettings, RenderStats, World, render_views};
 
 use crate::blender::LightPictures;
-pub use crate::blender::{BlenderLimits, BlenderProgram};
+pub use crate::blender::{BlenderLimits, BlenderProgram, DeviceChoice};
 use crate::build::finish::{check_strays, finish_again};
 use crate::build::start::is_build;
 use crate::error::PrepError;
@@ -186,7 +186,7 @@ fn render_scene(
     let mut world: Option<World> = None;
     for view in &scene.views {
         let seeds = [0, 1].map(|half| seed(id, view, half));
-        if run.is_done(&folder, view, &seed_texts(seeds)) {
+        if run.done(&folder, view, &seed_texts(seeds)).is_some() {
             report.kept += 1;
             continue;
         }
@@ -204,6 +204,7 @@ fn render_scene(
         let file = RenderFile {
             renderer: run.renderer.clone(),
             renderer_version: None,
+            device: None,
             samples_each_half: run.samples,
             seeds: seed_texts(seeds),
             max_bounces: MAX_BOUNCES,

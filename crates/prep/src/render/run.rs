@@ -94,13 +94,13 @@ impl RenderRun<'_> {
         change_scene(self.root, id, |path| path.contains(&ours) || path.contains(&shown), work)
     }
 
-    /// Whether the view's pictures exist and were made with these settings.
-    pub(super) fn is_done(&self, folder: &SceneFolder, view: &View, seeds: &[String; 2]) -> bool {
+    /// The record of the view's pictures, where they exist and were made with these settings.
+    pub(super) fn done(&self, folder: &SceneFolder, view: &View, seeds: &[String; 2]) -> Option<RenderFile> {
         let path = folder.render(&self.renderer, &view.id).join(RENDER_FILE);
-        let has_same_settings = |found: RenderFile| {
+        let has_same_settings = |found: &RenderFile| {
             (found.samples_each_half, &found.seeds, found.max_bounces) == (self.samples, seeds, MAX_BOUNCES)
         };
-        !self.force && json::read::<RenderFile>(&path).is_ok_and(has_same_settings)
+        json::read::<RenderFile>(&path).ok().filter(|found| !self.force && has_same_settings(found))
     }
 }
 

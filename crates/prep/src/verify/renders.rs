@@ -32,13 +32,27 @@ fn check_light(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
     }
 }
 
-/// Reports every view whose renders are missing, unreadable or of another size than its camera's picture.
+/// Reports every view whose renders are missing, unreadable, of another size than its camera's picture, or of another
+/// kind of device than the first view's.
 pub(super) fn check_renders(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
     check_light(folder, scene, faults);
+    let mut first_device = None;
     for view in &scene.views {
         if folder.truth().is_dir() {
             let file = format!("ground_truth/renders/{renderer}/{}/render.json", view.id);
             check_schema::<RenderFile>(folder.path(), &file, faults);
+            // One that cannot be read has been reported.
+            if let Ok(found) = json::read::<RenderFile>(&folder.path().join(&file)) {
+                let device = found.device.map_or("cpu", |device| device.kind.word());
+                let first = *first_device.get_or_insert(device);
+                if device != first {
+                    let message = format!(
+                        "{device} rendered this view and {first} another; pictures of two kinds of devices differ by \
+                         more than noise: render the scene again with --force"
+                    );
+                    faults.add("mixed_devices", &file, "/device", message);
+                }
+            }
         }
         let k = view.camera.intrinsics;
         let expected = (k.width as usize, k.height as usize);

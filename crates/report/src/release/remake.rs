@@ -117,7 +117,8 @@ fn render_command(with: &RenderedWith, recipe_samples: u32, dataset: &Dataset) -
     let scenes = if is_whole { String::new() } else { options("scene", with.scenes.iter().map(|id| id.as_str())) };
     let finish = if is_whole { "" } else { " && mateval prep finish DATASET" };
     let reference = reference(dataset, &with.scenes);
-    format!("mateval prep render DATASET --renderer {}{samples}{reference}{scenes}{finish}", with.renderer)
+    let device = with.device.as_ref().map_or(String::new(), |device| format!(" --device {}", device.kind));
+    format!("mateval prep render DATASET --renderer {}{device}{samples}{reference}{scenes}{finish}", with.renderer)
 }
 
 /// The options that make the scenes' references as they are, which have the same number of samples.

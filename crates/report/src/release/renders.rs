@@ -6,7 +6,7 @@ use std::path::Path;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
+use mateval_dataset::render_file::{RENDER_FILE, RenderDevice, RenderFile};
 use mateval_dataset::{RendererId, SceneId, ViewId, json};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
@@ -42,6 +42,9 @@ pub struct RenderedWith {
     pub renderer: RendererId,
     /// The renderer's own version; null for `builtin`.
     pub renderer_version: Option<String>,
+    /// The graphics card that rendered; absent where the processor did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<RenderDevice>,
     /// Samples per pixel of each of the two halves.
     pub samples_each_half: u32,
     /// The denoiser of the pictures that are shown.
@@ -69,14 +72,15 @@ pub(crate) fn rendered_with(dataset: &Dataset) -> Result<Vec<RenderedWith>, Repo
 
 fn add(all: &mut Vec<RenderedWith>, scene: &SceneId, file: RenderFile) {
     let is_same = |known: &RenderedWith| {
-        (&known.renderer, &known.renderer_version, known.samples_each_half, &known.denoiser)
-            == (&file.renderer, &file.renderer_version, file.samples_each_half, &file.denoiser)
+        (&known.renderer, &known.renderer_version, &known.device, known.samples_each_half, &known.denoiser)
+            == (&file.renderer, &file.renderer_version, &file.device, file.samples_each_half, &file.denoiser)
     };
     let at = all.iter().position(is_same).unwrap_or(all.len());
     if at == all.len() {
         all.push(RenderedWith {
             renderer: file.renderer,
             renderer_version: file.renderer_version,
+            device: file.device,
             samples_each_half: file.samples_each_half,
             denoiser: file.denoiser,
             views: 0,

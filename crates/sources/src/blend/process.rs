@@ -186,7 +186,7 @@ macro_rules! script {
 }
 
 /// The files of `blender_scripts`. The first one renders.
-const SCRIPTS: [(&str, &str); 26] = [
+const SCRIPTS: [(&str, &str); 27] = [
     script!("render.py"),
     script!("bake_blend.py"),
     script!("mateval/__init__.py"),
@@ -198,6 +198,7 @@ const SCRIPTS: [(&str, &str); 26] = [
     script!("mateval/channels.py"),
     script!("mateval/cycles.py"),
     script!("mateval/denoise.py"),
+    script!("mateval/devices.py"),
     script!("mateval/environment.py"),
     script!("mateval/evaluated.py"),
     script!("mateval/gltf.py"),
