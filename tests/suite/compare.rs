@@ -20,23 +20,32 @@ use mateval_prep::render::RendererKind;
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_tracer::{RenderSettings, World, render_views};
 
+use serde_json::Value;
+
 use super::command::{mateval, run};
 use super::planted::{rehash, roll};
 use super::sample::{dataset, files_below, own_materials};
 use mateval_testkit::{copy_folder, kept_folder};
 
 /// Samples a pixel of each half, theirs and ours. At 96x72 pixels, three standard errors of a tile are then two to four
-/// times the bound of 1 %, and those of a picture's mean are 0.5 to 0.8 % (under the lamp alone 1.5 to 2.2 %). The
-/// tests can therefore detect faults of 1.5 % in means under the ceiling's light, and of 5 % in single tiles.
+/// times the bound of 1 %, and those of a picture's mean are 0.5 to 0.8 % (under the lamp alone 1.5 to 2.2 %, so that
+/// some checks of its mean are undecided: a fault of 2 % may hide).
 const SAMPLES: u32 = 64;
 
 /// So few samples that the lamp's light is lost in noise.
 const FEW_SAMPLES: u32 = 16;
 
-/// `mateval prep compare DATASET`.
+/// `mateval prep compare DATASET` with a number of samples.
 fn compare(dataset: &Path, samples: u32) -> Command {
+    let mut command = compare_until_decided(dataset);
+    command.args(["--samples", &samples.to_string()]);
+    command
+}
+
+/// `mateval prep compare DATASET`.
+fn compare_until_decided(dataset: &Path) -> Command {
     let mut command = mateval();
-    command.args(["prep", "compare", "--samples", &samples.to_string()]).arg(dataset);
+    command.args(["prep", "compare"]).arg(dataset);
     command
 }
 
@@ -172,7 +181,7 @@ fn found(dataset: &Path, samples: u32, code: i32) -> CompareFile {
     serde_json::from_str(&run.stdout).unwrap()
 }
 
-/// The checks of a view that do not agree: picture and quantity, in the order of the checks.
+/// The checks of a view that differ: picture and quantity, in the order of the checks.
 fn faults(file: &CompareFile, view: &str) -> Vec<String> {
     let checks = file.checks().filter(|(_, of, check)| of.as_str() == view && check.state == State::Differs);
     checks.map(|(_, _, check)| format!("{} {:?}", check.picture, check.quantity)).collect()
@@ -199,22 +208,33 @@ fn times(LinearRgb(rgb): LinearRgb, factor: f32) -> LinearRgb {
     LinearRgb(rgb.map(|v| factor * v))
 }
 
+/// Whatever can be decided agrees, which is everything but some checks of the lamp's light.
 #[test]
 fn a_correct_twin_agrees() {
     let page = tempfile::tempdir().unwrap();
     let out = page.path().join("page");
-    let found = run(compare(&LAMBERT, SAMPLES).arg("--out").arg(&out)).ends_with(0);
-    assert!(
-        found.stdout.ends_with("\nblender agrees with the built-in tracer: 75 of 75 checks agree\n"),
-        "{}",
-        found.stdout
-    );
+    let found = run(compare_until_decided(&LAMBERT).arg("--out").arg(&out)).ends_with(0);
     let file: CompareFile = mateval_dataset::json::read(&out.join("compare.json")).unwrap();
+    let last = found.stdout.lines().last().unwrap();
+    assert_eq!(last, mateval_prep::compare::tables::verdict(&file));
+    let agree = 80 - file.undecided;
+    let beginning = format!("blender agrees with the built-in tracer: {agree} of 80 checks agree");
+    assert!(last.starts_with(&beginning), "{last}");
+    let open: Vec<_> = file.checks().filter(|(_, _, check)| check.state != State::Agrees).collect();
+    assert!(file.agrees && file.undecided == open.len() && open.len() <= 10, "{open:?}");
+    for (_, _, check) in open {
+        assert_eq!((check.picture.as_str(), check.state), ("group_00", State::TooNoisy), "{check}");
+        assert!(check.to_decide.is_some(), "{check}");
+    }
     let scene = &file.scenes[0];
-    assert_eq!((file.agrees, scene.tile_bound, scene.samples_each_half), (true, 0.01, SAMPLES));
+    assert_eq!((scene.tile_bound, scene.passes[0]), (0.01, 16));
+    assert!(scene.samples_each_half() <= 4 * SAMPLES, "{:?}", scene.passes);
     let lights = || scene.views.iter().flat_map(|view| &view.light);
     assert!(lights().count() == 20 && lights().all(|light| light.tiles.count == 30 && light.apart.is_empty()));
     check_page(&out, &file);
+    let verdict: Value = mateval_dataset::json::read(&LAMBERT.join("compare.json")).unwrap();
+    let counts = serde_json::json!({"agree": agree, "differ": 0, "undecided": file.undecided});
+    assert_eq!(verdict["scenes"]["room"], counts);
     // A comparison is replaced only with --force, and other files never.
     let mut again = compare(&LAMBERT, 1);
     run(again.arg("--out").arg(&out)).ends_with(2).says("add --force to overwrite it");
@@ -222,30 +242,64 @@ fn a_correct_twin_agrees() {
     run(other.arg("--force").arg("--out").arg(page.path())).ends_with(2).says("is not a comparison");
 }
 
-/// Every picture of the page exists, each existing picture is shown, and the page loads nothing from other sites.
-fn check_page(out: &Path, file: &CompareFile) {
-    let html = std::fs::read_to_string(out.join("index.html")).unwrap().replace("&#x2f;", "/");
-    let shown: Vec<PathBuf> =
-        html.split("<img src=\"").skip(1).map(|rest| rest.split('"').next().unwrap().into()).collect();
-    let mut sorted = shown.clone();
-    sorted.sort();
-    let pictures: Vec<PathBuf> =
-        files_below(out).into_iter().filter(|file| file.extension().unwrap() == "png").collect();
-    assert_eq!(sorted, pictures);
-    // Four pictures of each light; of geometry, three of each of five.
-    assert_eq!(shown.len(), 5 * (4 * 4 + 5 * 3));
-    assert!(
-        !html.contains("http:")
-            && !html.contains("https:")
-            && html.contains(&mateval_prep::compare::tables::verdict(file))
-    );
+/// The budget is kept, and below the least number of samples no check of light decides anything: pictures of the lamp
+/// alone that are twice too bright pass then, and do not with the twin's budget.
+#[test]
+fn too_few_samples_decide_nothing() {
+    let copy = copied(&LAMBERT);
+    for half in ["_a", "_b", ""] {
+        edit_light(copy.path(), "input", &format!("group_00{half}.exr"), |_, pixel| times(pixel, 2.0));
+    }
+    let found = |budget: &str, code: i32| -> CompareFile {
+        let mut command = compare_until_decided(copy.path());
+        let run = run(command.args(["--format", "json", "--budget", budget])).ends_with(code);
+        serde_json::from_str(&run.stdout).unwrap()
+    };
+    // The sum of groups needs no samples of ours.
+    let few = found("8", 1);
+    assert_eq!(faults(&few, "input"), ["rgb_a GroupSum", "rgb_b GroupSum"]);
+    assert_eq!(few.scenes[0].passes, [8]);
+    for (_, _, check) in few.checks() {
+        let is_light = matches!(check.quantity, Quantity::TilesOver | Quantity::MeanDifference);
+        assert_eq!(check.state == State::TooFew, is_light, "{check}");
+    }
+    assert_eq!(few.undecided, 40);
+    let more = found("24", 1);
+    assert!((16..=24).contains(&more.scenes[0].samples_each_half()));
+    check_holds(&faults(&more, "input"), &["group_00 TilesOver", "group_00 MeanDifference"]);
+    let mut both = compare(copy.path(), 16);
+    run(both.args(["--budget", "16"])).ends_with(2).says("cannot be used with");
 }
 
-/// The sample's own materials: tiles with plastic and glass do not decide; in the others the lamp is too noisy, which
-/// does not pass.
+/// Every picture of the pages exists, each existing picture is shown, and the pages load nothing from other sites. Where
+/// nothing differs, only the first view has pictures.
+fn check_page(out: &Path, file: &CompareFile) {
+    let page = |path: &Path| std::fs::read_to_string(path).unwrap().replace("&#x2f;", "/");
+    let index = page(&out.join("index.html"));
+    assert!(index.contains(&mateval_prep::compare::tables::verdict(file)));
+    assert!(index.contains("<a href=\"scenes/room/index.html\">room</a>") && !index.contains("<img"), "{index}");
+    let folder = out.join("scenes/room");
+    let html = page(&folder.join("index.html"));
+    let mut shown: Vec<PathBuf> =
+        html.split("<img src=\"").skip(1).map(|rest| folder.join(rest.split('"').next().unwrap())).collect();
+    shown.sort();
+    let pictures: Vec<PathBuf> = files_below(out)
+        .into_iter()
+        .filter(|file| file.extension().unwrap() == "png")
+        .map(|file| out.join(file))
+        .collect();
+    assert_eq!(shown, pictures);
+    // Four pictures of each light; of geometry, three of each of five.
+    assert_eq!(shown.len(), 4 * 4 + 5 * 3);
+    assert!([index, html].iter().all(|html| !html.contains("http:") && !html.contains("https:")));
+}
+
+/// The sample's own materials: tiles with plastic and glass do not decide; in the others the lamp is too noisy, which is
+/// neither for nor against the pictures.
 #[test]
-fn other_materials_do_not_decide_and_noise_does_not_pass() {
-    let file = found(&MIXED, FEW_SAMPLES, 1);
+fn other_materials_do_not_decide_and_noise_decides_nothing() {
+    let file = found(&MIXED, FEW_SAMPLES, 0);
+    assert!(file.agrees && file.undecided > 0);
     let scene = &file.scenes[0];
     assert_eq!(scene.tile_bound, 0.02);
     let words: Vec<&str> = scene.kinds.iter().map(|kind| kind.word()).collect();
@@ -300,19 +354,52 @@ fn other_pictures_are_found() {
     for file in ["rgb_a.exr", "rgb_b.exr", "rgb.exr"] {
         edit_light(dataset, "down_right", file, |_, LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * 1.1 / (v + 0.3))));
     }
-    let file = found(dataset, SAMPLES, 1);
+    let page = tempfile::tempdir().unwrap();
+    let mut command = compare(dataset, SAMPLES);
+    let run = run(command.args(["--format", "json", "--out"]).arg(page.path().join("page"))).ends_with(1);
+    let file: CompareFile = serde_json::from_str(&run.stdout).unwrap();
     check_holds(&faults(&file, "input"), &["base_color PsnrDb", "group_01 TilesOver"]);
     for view in ["up_left", "up_right"] {
         check_holds(
             &faults(&file, view),
-            &["base_color PsnrDb", "instance EqualShare", "part EqualShare", "depth MedianM", "rgb TilesOver"],
+            &["instance EqualShare", "silhouette EqualShare", "part EqualShare", "depth MedianM", "rgb TilesOver"],
         );
     }
-    check_holds(&faults(&file, "down_left"), &["base_color PsnrDb", "depth MedianM"]);
+    check_holds(&faults(&file, "down_left"), &["silhouette EqualShare", "depth MedianM"]);
     check_holds(
         &faults(&file, "down_right"),
         &["rgb TilesOver", "rgb MeanDifference", "rgb_a GroupSum", "rgb_b GroupSum"],
     );
+    // Of a view that is not the first, the page shows what differs.
+    let shown = |picture: &str| page.path().join("page/scenes/room/down_right").join(picture).exists();
+    assert_eq!(["rgb_ours.png", "depth_ours.png"].map(shown), [true, false]);
+}
+
+/// A piece of furniture is moved by 3 cm, and nothing else: its silhouette gives it away in the first view.
+#[test]
+fn a_moved_piece_is_found() {
+    let copy = copied(&LAMBERT);
+    let (dataset, views) = (copy.path(), views(&LAMBERT));
+    let mut scene = reference::read(&room(dataset)).unwrap();
+    // The instance of which the first view shows most, walls and floor aside.
+    let ids = png_io::read_ids(&room(dataset).view(&views[0].id).join("instance.png")).unwrap();
+    let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
+    ids.pixels().iter().filter(|id| **id > 0).for_each(|id| *counts.entry(*id).or_insert(0) += 1);
+    let is_piece = |id: u16| {
+        let mesh = &scene.surfaces[usize::from(id) - 1].mesh;
+        let low = mesh.positions.iter().copied().reduce(glam::Vec3::min).unwrap();
+        let high = mesh.positions.iter().copied().reduce(glam::Vec3::max).unwrap();
+        (high - low).max_element() < 2.0
+    };
+    let (piece, pixels) = counts.into_iter().filter(|(id, _)| is_piece(*id)).max_by_key(|(_, count)| *count).unwrap();
+    assert!(pixels > 200, "{pixels}");
+    let right = views[0].camera.rotation() * glam::DVec3::X;
+    let moved = &mut scene.surfaces[usize::from(piece) - 1].mesh;
+    moved.positions.iter_mut().for_each(|position| *position += 0.03 * right.as_vec3());
+    write_twin(dataset, scene, &views[..1], SAMPLES);
+    let file = found(dataset, SAMPLES, 1);
+    check_holds(&faults(&file, "input"), &["silhouette EqualShare"]);
+    assert_eq!(faults(&file, "up_left"), [""; 0]);
 }
 
 /// Mirrors every texture of a material, but not that of the environment.
@@ -367,7 +454,7 @@ fn wrong_lights_are_found() {
     assert!(!faults(&file, "up_right").iter().any(|fault| fault.contains("GroupSum")));
     assert_eq!(faults(&file, "down_left"), [""; 0]);
     let other = |view: &str| -> Vec<(String, State)> {
-        let checks = file.checks().filter(|(_, of, check)| of.as_str() == view && check.state != State::Agrees);
+        let checks = file.checks().filter(|(_, of, check)| of.as_str() == view && check.state.is_fault());
         checks.map(|(_, _, check)| (check.picture.clone(), check.state)).collect()
     };
     let expected = [("part", State::Unreadable), ("depth", State::Unreadable), ("group_00", State::Missing)];

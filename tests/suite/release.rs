@@ -41,7 +41,7 @@ fn stated(out: &Path) -> ReleaseFile {
 fn verdict(dataset: &Path, state: &str) -> Value {
     let check = |state: &str| {
         json!({"picture": "depth", "quantity": "median_m", "state": state, "measured": 0.123456789, "bound": 0.001,
-            "count": 9, "message": "median 123.456789 mm"})
+            "count": 9, "to_decide": null, "message": "median 123.456789 mm"})
     };
     let scene = json(&dataset.join("scenes/room/scene.json"));
     let ids = scene["views"].as_array().unwrap().iter().map(|view| view["id"].as_str().unwrap());
@@ -50,10 +50,11 @@ fn verdict(dataset: &Path, state: &str) -> Value {
         ids.enumerate().map(|(at, id)| json!({"view": id, "checks": [check(state_of(at))], "light": []})).collect();
     let file = json(&dataset.join("dataset.json"));
     json!({
-        "format": "mateval-compare/2", "tool": "mateval 9.8.7",
+        "format": "mateval-compare/3", "tool": "mateval 9.8.7",
         "dataset": {"name": file["name"], "version": file["version"], "manifest_sha256": file["manifest_sha256"]},
-        "renderer": "blender", "bounds": mateval_prep::compare::file::BOUNDS, "agrees": state == "agrees",
-        "scenes": [{"scene": "room", "kinds": ["lambert"], "tile_bound": 0.01, "samples_each_half": 4,
+        "renderer": "blender", "bounds": mateval_prep::compare::file::BOUNDS,
+        "agrees": state != "differs", "undecided": usize::from(state == "too_noisy"),
+        "scenes": [{"scene": "room", "kinds": ["lambert"], "tile_bound": 0.01, "passes": [4],
             "seeds": ["0000000000000001", "0000000000000002"], "source_materials": null, "views": views}],
     })
 }
@@ -161,6 +162,12 @@ fn a_faulty_release_fails_and_says_where() {
     let html = page(&out);
     assert!(html.contains("What fails") && html.contains("4 of 5 checks agree, 1 differs"), "{html}");
     assert!(html.contains("median 123.456789 mm"));
+    // The twin: a check that decides nothing is stated and is no fault of the release.
+    let undecided = write_verdict(folder.path(), "undecided", &self::verdict(dataset(), "too_noisy"));
+    let out = folder.path().join("too_noisy");
+    report(dataset(), &out, [("--verdicts", undecided.as_path())]).ends_with(0).prints("agree on 1 of 1");
+    let html = page(&out);
+    assert!(html.contains("agree, 1 undecided") && html.contains("some checks of 1 are undecided"), "{html}");
 }
 
 #[test]
@@ -179,7 +186,7 @@ fn files_that_do_not_fit_are_refused_together() {
     write_verdict(&verdicts, "e_contradicts", &change("/agrees", json!(false)));
     write_verdict(&verdicts, "f_partial", &change("/scenes/0/views/1/view", json!("elsewhere")));
     write_json(&verdicts.join("g_other.json"), &json!({"format": "mateval-lint/1"}));
-    write_json(&verdicts.join("h_bad.json"), &json!({"format": "mateval-compare/2", "agrees": "yes"}));
+    write_json(&verdicts.join("h_bad.json"), &json!({"format": "mateval-compare/3", "agrees": "yes"}));
     // Results of another dataset, and one that was changed.
     let [ceiling, floor] = RESULTS.each_ref().map(|path| json(path));
     let mut changed = floor;

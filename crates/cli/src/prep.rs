@@ -12,7 +12,7 @@ use mateval_dataset::open::check_outside_datasets;
 use mateval_dataset::withheld::Secret;
 use mateval_dataset::{SceneId, Severity, json};
 use mateval_files::whole::write_whole;
-use mateval_prep::compare::{CompareOptions, compare, tables};
+use mateval_prep::compare::{CompareOptions, Sampling, compare, tables};
 use mateval_prep::stats;
 use mateval_prep::verify::verify;
 
@@ -35,7 +35,7 @@ pub enum Command {
     /// Writes the files that describe the whole dataset, after scenes were made or rendered apart by --scene.
     Finish(FinishArgs),
     /// Compares Blender's pictures with those of the built-in path tracer, and keeps the verdict in the dataset's
-    /// compare.json, which its identity does not cover. Exit code 1: they disagree.
+    /// compare.json, which its identity does not cover. Exit code 1: a check that could be decided does not agree.
     Compare(CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
     Verify(VerifyArgs),
@@ -114,14 +114,17 @@ pub struct CompareArgs {
     /// Compare this scene only; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
-    /// Samples per pixel of each half of the built-in tracer's pictures [default: as few as leave the
-    /// decision to Blender's noise or to the bound, and at most as many as Blender's].
-    #[arg(long, value_parser = samples_parser())]
+    /// Most samples per pixel of each half of the built-in tracer's pictures. Samples are added until every check is
+    /// decided that they can decide [default: four times as many as Blender's].
+    #[arg(long, value_name = "SAMPLES", value_parser = samples_parser())]
+    budget: Option<u32>,
+    /// Render exactly this number of samples, whatever they decide.
+    #[arg(long, value_parser = samples_parser(), conflicts_with = "budget")]
     samples: Option<u32>,
     /// How to print the comparison.
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
-    /// Folder for compare.json and a page that shows both pictures side by side.
+    /// Folder for compare.json and pages, an index and one per scene, that show both pictures side by side.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Replace a comparison that already exists.
@@ -135,7 +138,11 @@ impl CompareArgs {
         let options = CompareOptions {
             dataset: self.dataset.clone(),
             scenes: self.scenes.clone(),
-            samples: self.samples,
+            samples: match (self.samples, self.budget) {
+                (Some(samples), _) => Sampling::Exactly(samples),
+                (None, Some(budget)) => Sampling::AtMost(budget),
+                (None, None) => Sampling::UntilDecided,
+            },
             out: self.out.clone(),
             force: self.force,
         };

@@ -10,13 +10,16 @@ use crate::layout::{BuildFolder, COMPARE};
 use crate::{DatasetError, SceneId, json};
 
 /// The version in the dataset's `compare.json`.
-pub const VERDICT_FORMAT: &str = "mateval-compare/1";
+pub const VERDICT_FORMAT: &str = "mateval-compare-verdict/2";
+
+/// The version before, whose checks counted as disagreeing where they decided nothing.
+const EARLIER_FORMAT: &str = "mateval-compare/1";
 
 /// A dataset's `compare.json`, which `mateval prep compare` writes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VerdictFile {
-    /// Always `mateval-compare/1`.
+    /// Always `mateval-compare-verdict/2`.
     pub format: String,
     /// The program that compared and its version, as in `mateval 0.1.0`.
     pub tool: String,
@@ -35,18 +38,22 @@ pub struct CompareCounts {
     pub agree: usize,
     /// Number of checks outside their bounds, or whose pictures are missing or unreadable.
     pub differ: usize,
-    /// Number of checks that decide nothing: too noisy, or without a pixel to compare.
-    pub too_noisy: usize,
+    /// Number of checks that decide nothing: too noisy, of too few samples, or without a pixel to compare.
+    pub undecided: usize,
 }
 
 impl VerdictFile {
-    /// The file of the dataset in `root`; absent if it does not exist. It may be about an earlier state of the dataset.
+    /// The file of the dataset in `root`; absent if it does not exist or is of an earlier version, since it can be made
+    /// again. It may be about an earlier state of the dataset.
     pub fn read_beside(root: &Path) -> Result<Option<Self>, DatasetError> {
         let path = root.join(COMPARE);
         if !path.exists() {
             return Ok(None);
         }
-        json::read_format(&path, VERDICT_FORMAT).map(Some)
+        match json::read_format(&path, VERDICT_FORMAT) {
+            Err(_) if json::read_format::<serde_json::Value>(&path, EARLIER_FORMAT).is_ok() => Ok(None),
+            read => read.map(Some),
+        }
     }
 
     /// Adds the scenes to the file of the dataset in `root`, and replaces those that it lists. Scenes that were
@@ -100,6 +107,11 @@ mod tests {
         assert_eq!(VerdictFile::read_beside(root).unwrap(), Some(verdict("two", &[("room", 5)])));
         assert_eq!(manifest::check(root).unwrap(), [], "the manifest does not concern it");
         assert_eq!(manifest::write(root).unwrap(), identity);
+        // A verdict of the version before is void, and one of an unknown version is an error.
+        for (format, is_void) in [(EARLIER_FORMAT, true), ("mateval-compare-verdict/9", false)] {
+            std::fs::write(root.join(COMPARE), format!("{{\"format\": \"{format}\", \"scenes\": {{}}}}")).unwrap();
+            assert_eq!(VerdictFile::read_beside(root).is_ok_and(|read| read.is_none()), is_void, "{format}");
+        }
         std::fs::write(root.join(COMPARE), "{").unwrap();
         VerdictFile::read_beside(root).unwrap_err();
     }

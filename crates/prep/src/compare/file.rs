@@ -9,13 +9,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The value of `format` in this version of the file.
-pub const COMPARE_FORMAT: &str = "mateval-compare/2";
+pub const COMPARE_FORMAT: &str = "mateval-compare/3";
 
 /// `compare.json`, and what `mateval prep compare --format json` prints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompareFile {
-    /// Always `mateval-compare/2`.
+    /// Always `mateval-compare/3`.
     pub format: String,
     /// The program that compared and its version, as in `mateval 0.1.0`.
     pub tool: String,
@@ -25,8 +25,10 @@ pub struct CompareFile {
     pub renderer: String,
     /// The bounds that decide whether a check agrees.
     pub bounds: Bounds,
-    /// Whether every check of every view agrees.
+    /// Whether every check that could be decided agrees, and every picture could be read.
     pub agrees: bool,
+    /// Number of checks that decide nothing: too noisy, of too few samples, or without a pixel to compare.
+    pub undecided: usize,
     /// The scenes, in the dataset's order.
     pub scenes: Vec<SceneComparison>,
 }
@@ -42,9 +44,10 @@ pub struct SceneComparison {
     /// How far a tile of light may be off, as a share of the built-in tracer's mean in `means`; smaller where all
     /// surfaces are Lambertian.
     pub tile_bound: f64,
-    /// Samples per pixel of each half that the built-in tracer rendered; 0 where no view was compared.
-    pub samples_each_half: u32,
-    /// Seeds of the built-in tracer's halves, 16 hexadecimal digits each.
+    /// Samples per pixel of each half that the built-in tracer rendered in each pass. Each half is the mean of its
+    /// passes, weighted by their samples. Empty where no view was compared.
+    pub passes: Vec<u32>,
+    /// Seeds of the halves of the first pass, 16 hexadecimal digits each.
     pub seeds: [String; 2],
     /// How far the converted materials, which the pictures show, are from the source's own; null where they were not
     /// converted, or where no view was compared. It is information and no check.
@@ -83,12 +86,14 @@ pub struct ViewComparison {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
-    /// Within its bound. The only state that passes.
+    /// Within its bound, and so precise that a fault of the stated size would have been found.
     Agrees,
-    /// Outside its bound.
+    /// Outside its bound, by more than noise explains.
     Differs,
-    /// Within its bound, but so noisy that it would be within it in any case.
+    /// Neither: the noise may hide a fault.
     TooNoisy,
+    /// A picture has so few samples that its halves do not state how noisy it is.
+    TooFew,
     /// Nothing was left to compare.
     Undecided,
     /// The file does not exist.
@@ -105,7 +110,8 @@ pub enum Quantity {
     File,
     /// PSNR over valid pixels, linear, peak 1, in decibels. Agrees where it is at least the bound.
     PsnrDb,
-    /// Share of the pixels away from edges whose ids are equal. Agrees where it is at least the bound.
+    /// Share of the pixels whose ids are equal: away from edges, or, of the picture `silhouette`, at the edge of the
+    /// instance for which it is lowest. Agrees where it is at least the bound.
     EqualShare,
     /// Median absolute difference, in metres.
     MedianM,
@@ -135,8 +141,20 @@ pub struct Check {
     pub bound: Option<f64>,
     /// Number of pixels or tiles that were measured.
     pub count: usize,
+    /// The samples that would decide the check; null where it is decided, or where no number would.
+    pub to_decide: Option<SamplesToDecide>,
     /// What was found, as a sentence.
     pub message: String,
+}
+
+/// Samples per pixel of each half with which a check would be decided, if the difference stays what it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SamplesToDecide {
+    /// Of the built-in tracer's pictures.
+    pub ours: u32,
+    /// Of the other renderer's pictures: as many as they have where more of the built-in tracer's would do.
+    pub theirs: u32,
 }
 
 /// A picture of light, compared.
@@ -186,8 +204,9 @@ pub struct TilesCompared {
     /// Median of the absolute value of each tile's largest relative difference; null without tiles, or in a black
     /// picture.
     pub median: Option<f64>,
-    /// Median of three standard errors divided by the bound; null as above. Above 5 the picture is too noisy for a
-    /// verdict.
+    /// Number of tiles that are not over the bound, and so noisy that a fault of the stated size could hide in them.
+    pub open: usize,
+    /// Median of three standard errors divided by the bound; null as above.
     pub noise: Option<f64>,
     /// The tile that is furthest over the bound, or nearest to it where none is over.
     pub worst: Option<WorstTile>,
@@ -230,6 +249,13 @@ impl CompareFile {
     }
 }
 
+impl SceneComparison {
+    /// Samples per pixel of each half of the built-in tracer's pictures; 0 where no view was compared.
+    pub fn samples_each_half(&self) -> u32 {
+        self.passes.iter().fold(0, |all, pass| all.saturating_add(*pass))
+    }
+}
+
 impl ViewComparison {
     /// The check of this quantity of this picture; absent if it was not made.
     pub fn check(&self, picture: &str, quantity: Quantity) -> Option<&Check> {
@@ -238,12 +264,27 @@ impl ViewComparison {
 }
 
 impl State {
+    /// All states, in the order in which they are counted.
+    pub const ALL: [Self; 7] =
+        [Self::Agrees, Self::Differs, Self::Missing, Self::Unreadable, Self::TooNoisy, Self::TooFew, Self::Undecided];
+
+    /// Whether it decides nothing, so that it speaks neither for nor against the pictures.
+    pub fn is_open(self) -> bool {
+        matches!(self, Self::TooNoisy | Self::TooFew | Self::Undecided)
+    }
+
+    /// Whether it speaks against the pictures.
+    pub fn is_fault(self) -> bool {
+        self != Self::Agrees && !self.is_open()
+    }
+
     /// The word for it in tables and messages.
     pub fn word(self) -> &'static str {
         match self {
             Self::Agrees => "agrees",
             Self::Differs => "DIFFERS",
             Self::TooNoisy => "too noisy",
+            Self::TooFew => "too few samples",
             Self::Undecided => "undecided",
             Self::Missing => "missing",
             Self::Unreadable => "unreadable",
@@ -254,7 +295,7 @@ impl State {
 /// A check of the file itself, which has no number.
 pub(super) fn file_check(picture: &str, state: State, message: String) -> Check {
     let picture = picture.to_owned();
-    Check { picture, quantity: Quantity::File, state, measured: None, bound: None, count: 0, message }
+    Check { picture, quantity: Quantity::File, state, measured: None, bound: None, count: 0, to_decide: None, message }
 }
 
 impl std::fmt::Display for Check {
@@ -332,6 +373,8 @@ pub struct Bounds {
     pub base_color_psnr_db: f64,
     /// Smallest share of equal ids away from edges.
     pub equal_id_share: f64,
+    /// Smallest share of equal ids at the edge of an instance.
+    pub silhouette_share: f64,
     /// Largest median difference of depths, in metres.
     pub depth_median_m: f64,
     /// Largest median angle between normals, in degrees.
@@ -342,12 +385,20 @@ pub struct Bounds {
     pub other_tile: f64,
     /// Share of the tiles that may be over their bound.
     pub tile_share_over: f64,
+    /// The fault that is found in a tile where the check agrees, as a multiple of the tile's bound.
+    pub tile_fault: f64,
+    /// Share of the tiles that may be too noisy for that where the check agrees.
+    pub tile_share_open: f64,
     /// How far a picture's mean may be off, as a share of itself.
     pub picture_mean: f64,
-    /// Number of standard errors added to every bound of light.
+    /// The fault of a picture's mean that is found where the check agrees, as a share of the mean.
+    pub picture_mean_fault: f64,
+    /// Number of standard errors added to the bound of a tile, and to a difference before it is compared with a fault.
     pub standard_errors: f64,
-    /// Where the added standard errors exceed the bound by this factor, a picture is too noisy.
-    pub noise_over_bound: f64,
+    /// Number of standard errors added to the bound of a picture's mean.
+    pub standard_errors_mean: f64,
+    /// The least number of samples per pixel of each half with which light is compared.
+    pub least_samples: u32,
     /// How far the sum of a half's light groups may be from the half, as a share of the pixel's value.
     pub group_sum: f64,
 }
@@ -360,6 +411,10 @@ pub const BOUNDS: Bounds = Bounds {
     // Smallest share of equal ids away from edges. Both renderers look through pixel centres; the rest allows for
     // surfaces in the same plane: either may be hit first.
     equal_id_share: 0.99,
+    // Smallest share of equal ids at the edge of an instance. Both renderers look through pixel centres, so that only
+    // edges that pass through a centre are left to rounding. A piece that is off by a fifth of a pixel across its
+    // outline loses half of a fifth of the pixels that form it.
+    silhouette_share: 0.9,
     // Largest median difference of depths, in metres. Blender stores positions as 32-bit floats, which are exact to
     // microns in a room.
     depth_median_m: 1e-3,
@@ -377,17 +432,31 @@ pub const BOUNDS: Bounds = Bounds {
     // Share of the tiles that may be over their bound: at edges of lamps and in corners of the room a single texel
     // decides.
     tile_share_over: 0.01,
+    // The fault that is found in a tile where the check agrees, as a multiple of the tile's bound. A piece that is
+    // absent, turned or of another colour changes its tiles by tens of percents.
+    tile_fault: 5.0,
+    // Share of the tiles that may be noisier than that. Tiles at the rims of lamps and windows, which are a hundred
+    // times brighter than the room, stay noisy with any number of samples.
+    tile_share_open: 0.25,
     // How far a picture's mean may be off, as a share of itself. Differences between tiles average out over a picture;
     // a lamp of a different strength does not.
     picture_mean: 0.005,
-    // Number of standard errors added to every bound of light. A normal deviate is further off once in 370 times.
+    // The fault of a picture's mean that is found where the check agrees. A lamp whose strength is off by 3 % is the
+    // smallest fault that the tests plant; between 0.5 % and 2 % it depends on the noise which state a check has.
+    picture_mean_fault: 0.02,
+    // Number of standard errors added to the bound of a tile, and to a difference before it is compared with a fault. A
+    // normal deviate is further off once in 370 times, in one direction once in 740 times.
     standard_errors: 3.0,
-    // Where the added standard errors exceed the bound by this factor, agreement has no meaning.
-    noise_over_bound: 5.0,
+    // Number of standard errors added to the bound of a picture's mean. Three channels of equal expected value exceed
+    // four once in 5,000 pictures, a release of 184 rooms having about 4,000.
+    standard_errors_mean: 4.0,
+    // The least number of samples per pixel of each half with which light is compared. Light is long-tailed: with fewer
+    // samples the rare bright paths are missing from most halves, which then look less noisy than they are.
+    least_samples: 16,
     // How far the sum of a half's groups may be from the half, as a share of the pixel's value, or of the picture's
     // mean where the pixel is darker. Sums of 32-bit floats over thousands of samples keep at least four digits.
     group_sum: 1e-3,
 };
 
 /// How often noise alone may make a picture count as different by its number of tiles.
-pub(super) const FALSE_ALARM: f64 = 1e-3;
+pub(super) const FALSE_ALARM: f64 = 1e-4;

@@ -4,8 +4,9 @@
 //! in the dataset; and, on request, a folder that holds it and a page with both pictures side by side.
 //!
 //! Between: `pictures` reads Blender's pictures and renders ours; `geometry` compares pictures without light, and
-//! `light` compares pictures of light tile by tile, with the statistics of `tiles`. [`mod@file`] states which materials
-//! may differ and how far. Converted materials are compared with the source's own by the built-in tracer's pictures of
+//! `light` compares pictures of light tile by tile, with the statistics of `tiles`. A check of light has three outcomes:
+//! a fault, none, or too much noise to say; samples of ours are added while that would decide a check. [`mod@file`] states
+//! which materials may differ and how far. Converted materials are compared with the source's own by the built-in tracer's pictures of
 //! both.
 
 pub mod file;
@@ -20,6 +21,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::recipe::MOST_SAMPLES;
 use crate::render::RendererKind;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{BuildFolder, COMPARE, SceneFolder};
@@ -34,15 +36,30 @@ use mateval_metrics::Psnr;
 use mateval_tracer::World;
 
 use self::file::{
-    BOUNDS, COMPARE_FORMAT, CompareFile, LightComparison, MaterialKind, SceneComparison, SourceComparison, State,
-    ViewComparison, file_check,
+    BOUNDS, COMPARE_FORMAT, CompareFile, LightComparison, MaterialKind, SamplesToDecide, SceneComparison,
+    SourceComparison, State, ViewComparison, file_check,
 };
 use self::geometry::{OurGeometry, TheirGeometry};
 use self::light::ShownKinds;
 use self::page::ViewPreviews;
-use self::pictures::{OurLight, PILOT, TheirView};
+use self::pictures::{OurLight, OurRender, TheirView};
 use self::tiles::Halves;
 use crate::error::PrepError;
+
+/// Samples per pixel of each half that the built-in tracer renders.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampling {
+    /// Until every check that they can decide is decided, and at most [`BUDGET_OVER_THEIRS`] times as many as Blender's:
+    /// at that number an eighth of the noise is ours.
+    #[default]
+    UntilDecided,
+    /// Until every check that they can decide is decided, and at most this number.
+    AtMost(u32),
+    Exactly(u32),
+}
+
+/// The budget of samples as a multiple of Blender's.
+const BUDGET_OVER_THEIRS: u32 = 4;
 
 /// What to compare, and where to write the page.
 #[derive(Clone, Debug, Default)]
@@ -50,9 +67,8 @@ pub struct CompareOptions {
     pub dataset: PathBuf,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,
-    /// Samples per pixel of each half that the built-in tracer renders. Where absent, as few as leave the decision to
-    /// Blender's noise or to the bound, and at most as many as Blender's.
-    pub samples: Option<u32>,
+    /// How many samples the built-in tracer renders.
+    pub samples: Sampling,
     /// Folder for the page; no page is written where absent.
     pub out: Option<PathBuf>,
     /// Replace a comparison that already exists.
@@ -77,7 +93,6 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     // Whether the dataset can be written is found before hours of rendering, and not after.
     drop(BuildFolder::of(&dataset.root).lease_of_verdict()?);
     let work = options.out.as_deref().map(WorkFolder::start).transpose()?;
-    let mut previews = Vec::new();
     let mut file = CompareFile {
         format: COMPARE_FORMAT.to_owned(),
         tool: tool.to_owned(),
@@ -85,23 +100,27 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
         renderer: COMPARED.to_string(),
         bounds: BOUNDS,
         agrees: true,
+        undecided: 0,
         scenes: Vec::new(),
     };
     for (at, scene) in scenes.iter().enumerate() {
         progress(Report::part(&format!("scene {}", scene.id), at, scenes.len()));
         let place = work.as_ref().map(WorkFolder::path);
         let (found, shown) = compare_scene(&dataset.folder(&scene.id), scene, options.samples, place, progress)?;
+        if let Some(place) = place {
+            page::write_scene(place, &file, &found, &shown)?;
+        }
         file.scenes.push(found);
-        previews.push(shown);
     }
-    let agrees = file.checks().all(|(_, _, check)| check.state == State::Agrees);
-    file.agrees = agrees;
+    let states: Vec<State> = file.checks().map(|(_, _, check)| check.state).collect();
+    file.agrees = !states.iter().any(|state| state.is_fault());
+    file.undecided = states.iter().filter(|state| state.is_open()).count();
     if !file.scenes.is_empty() {
         verdict(&file).add_beside(&dataset.root)?;
     }
     if let Some(work) = work {
         json::write(&work.path().join(COMPARE), &file)?;
-        mateval_files::whole::write_whole(&work.path().join("index.html"), page::page(&file, &previews).as_bytes())?;
+        mateval_files::whole::write_whole(&work.path().join("index.html"), page::index(&file).as_bytes())?;
         work.finish()?;
     }
     Ok(file)
@@ -115,7 +134,7 @@ fn verdict(file: &CompareFile) -> VerdictFile {
         match check.state {
             State::Agrees => counts.agree += 1,
             State::Differs | State::Missing | State::Unreadable => counts.differ += 1,
-            State::TooNoisy | State::Undecided => counts.too_noisy += 1,
+            State::TooNoisy | State::TooFew | State::Undecided => counts.undecided += 1,
         }
     }
     VerdictFile {
@@ -166,7 +185,7 @@ fn check_out(options: &CompareOptions) -> Result<(), PrepError> {
 fn compare_scene(
     folder: &SceneFolder,
     scene: &SceneFile,
-    samples: Option<u32>,
+    sampling: Sampling,
     out: Option<&Path>,
     progress: Progress<'_>,
 ) -> Result<(SceneComparison, Vec<ViewPreviews>), PrepError> {
@@ -177,55 +196,88 @@ fn compare_scene(
         true => BOUNDS.lambert_tile,
         false => BOUNDS.other_tile,
     };
-    let compared: Vec<&View> = scene.views.iter().filter(|view| rendered(folder, view).is_some()).collect();
-    let samples = match samples {
-        _ if compared.is_empty() => 0,
-        Some(samples) => samples,
-        None => {
-            let pilot = Pilot { folder, id: &scene.id, world: &world, kinds: &kinds, tile_bound };
-            pilot.samples(&compared, progress)?
-        }
-    };
-    let mut ours = match compared.is_empty() {
-        true => Vec::new(),
-        false => pictures::render_ours(&world, &scene.id, &compared, samples, progress)?,
+    let mut pairs = Vec::new();
+    for view in &scene.views {
+        let Some(theirs) = rendered(folder, view).map(|folder| TheirView { folder, size: size(view) }) else {
+            continue;
+        };
+        let their_samples = theirs.samples()?;
+        pairs.push(ViewPair {
+            folder,
+            view,
+            theirs,
+            their_samples,
+            reference: &reference,
+            world: &world,
+            kinds: &kinds,
+            tile_bound,
+        });
     }
-    .into_iter();
-    let first_rgb = ours.as_slice().first().map(|light| light.rgb.clone());
+    let ours = render_ours(&world, &scene.id, &pairs, sampling, progress)?;
     let (mut views, mut previews) = (Vec::new(), Vec::new());
     let step = format!("{} compare", scene.id);
+    let mut compared = pairs.iter().zip(&ours.lights).peekable();
     for (at, view) in scene.views.iter().enumerate() {
         progress(Report::step(&step, at, scene.views.len()));
-        let their_view = their_view(folder, view);
-        let (Some(theirs), Some(light)) = (&their_view, their_view.as_ref().and_then(|_| ours.next())) else {
+        let Some((pair, light)) = compared.next_if(|(pair, _)| pair.view.id == view.id) else {
             views.push(missing(view));
             continue;
         };
-        let pair = ViewPair { folder, view, reference: &reference, world: &world, kinds: &kinds, tile_bound };
-        let (found, shown) = pair.compare(&light, theirs, out.map(|out| (out, scene)))?;
+        let (found, shown) = pair.compare(light, ours.samples(), out.map(|out| (out, scene, previews.is_empty())))?;
         views.push(found);
         previews.extend(shown);
     }
     progress(Report::step(&step, scene.views.len(), scene.views.len()));
-    let source_materials = match (compared.first(), first_rgb) {
-        (Some(view), Some(rgb)) => {
-            let against = Converted { folder, scene, view, world: &world, rgb: &rgb, kinds: &kinds, tile_bound };
-            against.compare(samples, progress)?
-        }
+    let source_materials = match (pairs.first(), ours.lights.first()) {
+        (Some(pair), Some(light)) => Converted { pair, scene, rgb: &light.rgb }.compare(ours.passes(), progress)?,
         _ => None,
     };
-    let seeds = pictures::seeds(&scene.id).map(|seed| format!("{seed:016x}"));
+    let seeds = pictures::seeds(&scene.id, 0).map(|seed| format!("{seed:016x}"));
     let kinds = kinds.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
     let found = SceneComparison {
         scene: scene.id.clone(),
         kinds,
         tile_bound,
-        samples_each_half: samples,
+        passes: ours.passes().to_vec(),
         seeds,
         source_materials,
         views,
     };
     Ok((found, previews))
+}
+
+/// Renders the views with the built-in tracer, until the samples are those asked for, or more would decide no check.
+fn render_ours(
+    world: &World,
+    id: &SceneId,
+    pairs: &[ViewPair<'_>],
+    sampling: Sampling,
+    progress: Progress<'_>,
+) -> Result<OurRender, PrepError> {
+    let mut ours = OurRender::new();
+    let Some(most_of_theirs) = pairs.iter().map(|pair| pair.their_samples).max() else { return Ok(ours) };
+    let budget = match sampling {
+        Sampling::Exactly(samples) | Sampling::AtMost(samples) => samples,
+        Sampling::UntilDecided => BOUNDS.least_samples.max(most_of_theirs.saturating_mul(BUDGET_OVER_THEIRS)),
+    };
+    let first = match sampling {
+        Sampling::Exactly(samples) => samples,
+        _ => BOUNDS.least_samples.min(budget),
+    };
+    let views: Vec<&View> = pairs.iter().map(|pair| pair.view).collect();
+    ours.add(world, id, &views, first, progress)?;
+    while ours.samples() < budget {
+        let mut wanted = None;
+        for (pair, light) in pairs.iter().zip(&ours.lights) {
+            wanted = wanted.max(pair.wanted_samples(light, ours.samples())?);
+        }
+        let Some(wanted) = wanted else { break };
+        // At least half as many again, since the estimate is itself noisy, and every look at the checks costs.
+        let done = ours.samples();
+        let next = wanted.max(done.saturating_add(done.div_ceil(2))).min(budget);
+        ours.add(world, id, &views, (next - done).min(MOST_SAMPLES), progress)?;
+    }
+    Ok(ours)
 }
 
 fn size(view: &View) -> (usize, usize) {
@@ -238,43 +290,13 @@ fn missing(view: &View) -> ViewComparison {
     ViewComparison { view: view.id.clone(), checks, light: Vec::new() }
 }
 
-/// What is needed to find the number of samples of a scene.
-struct Pilot<'a> {
-    folder: &'a SceneFolder,
-    id: &'a SceneId,
-    world: &'a World,
-    kinds: &'a [MaterialKind],
-    tile_bound: f64,
-}
-
-impl Pilot<'_> {
-    /// The number of samples for all views, at most as many as Blender's.
-    fn samples(&self, views: &[&View], progress: Progress<'_>) -> Result<u32, PrepError> {
-        let their_views: Vec<TheirView> = views.iter().filter_map(|view| their_view(self.folder, view)).collect();
-        let most = pictures::most_samples(&their_views)?;
-        if most <= PILOT {
-            return Ok(most);
-        }
-        let ours = pictures::render_ours(self.world, self.id, views, PILOT, progress)?;
-        let mut wanted = PILOT;
-        for ((view, ours), theirs) in views.iter().zip(&ours).zip(&their_views) {
-            let geometry = OurGeometry::read(self.folder, view, self.world)?;
-            let shown = ShownKinds::new(&geometry.instance, self.kinds, &geometry.valid);
-            wanted = wanted.max(pictures::wanted_samples(ours, theirs, &shown, self.tile_bound));
-        }
-        Ok(wanted.min(most))
-    }
-}
-
-/// Blender's pictures of the view; absent if they are missing or incomplete.
-fn their_view(folder: &SceneFolder, view: &View) -> Option<TheirView> {
-    rendered(folder, view).map(|folder| TheirView { folder, size: size(view) })
-}
-
 /// A view that both renderers have rendered.
 struct ViewPair<'a> {
     folder: &'a SceneFolder,
     view: &'a View,
+    theirs: TheirView,
+    /// Samples per pixel of each half of Blender's.
+    their_samples: u32,
     reference: &'a ReferenceScene,
     world: &'a World,
     kinds: &'a [MaterialKind],
@@ -282,24 +304,42 @@ struct ViewPair<'a> {
 }
 
 impl ViewPair<'_> {
+    /// The dataset's own pictures of the view.
+    fn geometry(&self) -> Result<OurGeometry, PrepError> {
+        let ours = OurGeometry::read(self.folder, self.view, self.world)?;
+        let (width, height) = self.theirs.size;
+        match ours.has_size(self.theirs.size) {
+            true => Ok(ours),
+            false => Err(PrepError::ViewSize { path: self.folder.view(&self.view.id), expected: [width, height] }),
+        }
+    }
+
+    /// The samples of each of our halves that would decide the most demanding check that more of ours would decide;
+    /// absent if more would decide none. `samples` are those of `light`.
+    fn wanted_samples(&self, light: &OurLight, samples: u32) -> Result<Option<u32>, PrepError> {
+        let geometry = self.geometry()?;
+        let shown = ShownKinds::new(&geometry.instance, self.kinds, &geometry.valid);
+        let mut found = ViewComparison { view: self.view.id.clone(), checks: Vec::new(), light: Vec::new() };
+        self.compare_lights(light, samples, &shown, &mut found);
+        let needed = found.checks.iter().filter_map(|check| check.to_decide);
+        Ok(needed.filter(|needed| needed.theirs <= self.their_samples).map(|needed| needed.ours).max())
+    }
+
     fn compare(
         &self,
         light: &OurLight,
-        theirs: &TheirView,
-        out: Option<(&Path, &SceneFile)>,
+        samples: u32,
+        out: Option<(&Path, &SceneFile, bool)>,
     ) -> Result<(ViewComparison, Option<ViewPreviews>), PrepError> {
-        let ours = OurGeometry::read(self.folder, self.view, self.world)?;
-        if !ours.has_size(theirs.size) {
-            let (width, height) = theirs.size;
-            return Err(PrepError::ViewSize { path: self.folder.view(&self.view.id), expected: [width, height] });
-        }
+        let ours = self.geometry()?;
+        let theirs = &self.theirs;
         let mut found = ViewComparison { view: self.view.id.clone(), checks: Vec::new(), light: Vec::new() };
         let their_geometry = TheirGeometry::read(theirs, &mut found.checks);
         found.checks.extend(geometry::compare(&ours, &their_geometry));
         let shown = ShownKinds::new(&ours.instance, self.kinds, &ours.valid);
-        let their_light = self.compare_lights(light, theirs, &shown, &mut found);
-        let Some((out, scene)) = out else { return Ok((found, None)) };
-        let mut previews = ViewPreviews::new(out, scene, &self.view.id)?;
+        let their_light = self.compare_lights(light, samples, &shown, &mut found);
+        let Some((out, scene, whole)) = out else { return Ok((found, None)) };
+        let mut previews = ViewPreviews::new(out, scene, &found, whole)?;
         let both = std::iter::once(&light.rgb).chain(&light.groups).zip(&their_light);
         let both = both.filter_map(|(ours, theirs)| theirs.as_ref().map(|theirs| [ours, theirs]));
         for (light, both) in found.light.iter().zip(both) {
@@ -314,14 +354,15 @@ impl ViewPair<'_> {
     fn compare_lights(
         &self,
         light: &OurLight,
-        theirs: &TheirView,
+        samples: u32,
         shown: &ShownKinds,
         found: &mut ViewComparison,
     ) -> Vec<Option<Halves>> {
-        let mut all = vec![self.compare_light("rgb", None, &light.rgb, theirs, shown, found)];
+        let samples = SamplesToDecide { ours: samples, theirs: self.their_samples };
+        let mut all = vec![self.compare_light("rgb", None, &light.rgb, samples, shown, found)];
         for (at, (ours, group)) in light.groups.iter().zip(&self.reference.lights).enumerate() {
             let name = Some(group.name.clone());
-            all.push(self.compare_light(&format!("group_{at:02}"), name, ours, theirs, shown, found));
+            all.push(self.compare_light(&format!("group_{at:02}"), name, ours, samples, shown, found));
         }
         let read: Vec<&Halves> = all.iter().flatten().collect();
         if let Some((rgb, groups)) = read.split_first().filter(|_| read.len() == all.len()) {
@@ -338,15 +379,15 @@ impl ViewPair<'_> {
         picture: &str,
         name: Option<String>,
         ours: &Halves,
-        theirs: &TheirView,
+        samples: SamplesToDecide,
         shown: &ShownKinds,
         found: &mut ViewComparison,
     ) -> Option<Halves> {
-        match theirs.halves(picture) {
+        match self.theirs.halves(picture) {
             Ok(theirs) => {
                 found.checks.extend(light::same_halves(picture, &theirs));
                 let (light, checks): (LightComparison, _) =
-                    light::compare(picture, name, [ours, &theirs], shown, self.tile_bound);
+                    light::compare(picture, name, [ours, &theirs], samples, shown, self.tile_bound);
                 found.light.push(light);
                 found.checks.extend(checks);
                 Some(theirs)
@@ -361,31 +402,31 @@ impl ViewPair<'_> {
 
 /// A view of a scene, rendered with its converted materials.
 struct Converted<'a> {
-    folder: &'a SceneFolder,
+    pair: &'a ViewPair<'a>,
     scene: &'a SceneFile,
-    view: &'a View,
-    world: &'a World,
     rgb: &'a Halves,
-    kinds: &'a [MaterialKind],
-    tile_bound: f64,
 }
 
 impl Converted<'_> {
     /// Renders the view with the source's own materials and compares; absent if the materials were not converted.
-    fn compare(&self, samples: u32, progress: Progress<'_>) -> Result<Option<SourceComparison>, PrepError> {
-        let reference = self.world.scene();
-        let Some(source) = reference::read_source_materials(self.folder, reference.materials.len())? else {
+    fn compare(&self, passes: &[u32], progress: Progress<'_>) -> Result<Option<SourceComparison>, PrepError> {
+        let ViewPair { folder, view, world, kinds, tile_bound, reference, .. } = *self.pair;
+        let Some(source) = reference::read_source_materials(folder, reference.materials.len())? else {
             return Ok(None);
         };
-        let theirs = World::sharing(Arc::new(source.in_scene(reference)), self.world.accel().clone())?;
-        let theirs = pictures::render_ours(&theirs, &self.scene.id, &[self.view], samples, progress)?;
-        let Some(theirs) = theirs.first().map(|light| &light.rgb) else { return Ok(None) };
-        let geometry = OurGeometry::read(self.folder, self.view, self.world)?;
-        let shown = ShownKinds::new(&geometry.instance, self.kinds, &geometry.valid);
-        let (light, _) = light::compare("rgb", None, [self.rgb, theirs], &shown, self.tile_bound);
+        let own = World::sharing(Arc::new(source.in_scene(reference)), world.accel().clone())?;
+        let mut theirs = OurRender::new();
+        for samples in passes {
+            theirs.add(&own, &self.scene.id, &[view], *samples, progress)?;
+        }
+        let samples = SamplesToDecide { ours: theirs.samples(), theirs: theirs.samples() };
+        let Some(theirs) = theirs.lights.first().map(|light| &light.rgb) else { return Ok(None) };
+        let geometry = self.pair.geometry()?;
+        let shown = ShownKinds::new(&geometry.instance, kinds, &geometry.valid);
+        let (light, _) = light::compare("rgb", None, [self.rgb, theirs], samples, &shown, tile_bound);
         let error = self.error_without_noise(theirs, &geometry.valid).filter(|error| *error > 0.0);
         let psnr_db = error.and_then(|error| Psnr::from_mse(error).ok()).map(|psnr| psnr.db);
-        Ok(Some(SourceComparison { view: self.view.id.clone(), psnr_db, light }))
+        Ok(Some(SourceComparison { view: view.id.clone(), psnr_db, light }))
     }
 
     /// The mean over valid pixels of the product of the halves' errors, which are independent of each other, as a

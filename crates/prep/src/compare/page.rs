@@ -1,8 +1,10 @@
-//! Shows the comparison as a page, with the pictures of both renderers side by side and their difference, as 8-bit PNG.
+//! Shows the comparison as an index of the scenes and a page for each, with the pictures of both renderers side by side
+//! and their difference, as 8-bit PNG.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::ViewId;
+use mateval_dataset::SceneId;
 use mateval_dataset::dataset::{DatasetVersion, SceneFile};
 use mateval_files::{FileError, untrusted};
 use mateval_image::png_io::write_rgb_bytes;
@@ -13,37 +15,35 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::file::{CompareFile, LightComparison, SourceComparison, State};
+use super::file::{Check, CompareFile, LightComparison, SceneComparison, SourceComparison, State, ViewComparison};
 use super::geometry::{OurGeometry, TheirGeometry, angle_deg, away_from_edges};
 use super::light::ShownKinds;
-use super::tables::{faults, verdict};
-use super::tiles::{Halves, difference};
+use super::tables::{Counts, counted, verdict};
+use super::tiles::{Halves, Tolerance};
 use crate::error::PrepError;
 
-const TEMPLATE: &str = include_str!("page.j2");
+/// The index of the scenes.
+const INDEX: &str = include_str!("page.j2");
 
-/// HTML with the verdict, the checks that do not agree and the pictures of each view; `previews` contains one list per
-/// scene.
-pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String {
+/// The page of a scene.
+const SCENE: &str = include_str!("scene.j2");
+
+/// The folder of a scene's page and pictures, below that of the index.
+fn scene_folder(scene: &SceneId) -> String {
+    format!("scenes/{scene}")
+}
+
+/// HTML with the verdict of the dataset and one row per scene, which leads to the scene's page.
+pub(super) fn index(file: &CompareFile) -> String {
     let scenes: Vec<_> = file
         .scenes
         .iter()
-        .zip(previews)
-        .map(|(scene, previews)| {
-            let views: Vec<_> = scene
-                .views
-                .iter()
-                .map(|view| {
-                    let shown = previews.iter().find(|shown| shown.view == view.view.as_str());
-                    let agrees = view.checks.iter().all(|check| check.state == State::Agrees);
-                    context! { view => view.view.as_str(), agrees, checks => Serde(&view.checks), shown => Serde(shown) }
-                })
-                .collect();
-            let kinds: Vec<&str> = scene.kinds.iter().map(|kind| kind.word()).collect();
+        .map(|scene| {
+            let counts = Counts::of(scene);
             context! {
-                scene => scene.scene.as_str(), kinds, views,
-                tile_bound => 100.0 * scene.tile_bound, samples => scene.samples_each_half,
-                source => scene.source_materials.as_ref().map(source_sentence),
+                scene => scene.scene.as_str(), page => format!("{}/index.html", scene_folder(&scene.scene)),
+                word => counts.word(), class => class(counts), agree => counts.agree, faults => counts.faults,
+                open => counts.open, samples => scene.samples_each_half(),
             }
         })
         .collect();
@@ -51,9 +51,55 @@ pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String
     let values = context! {
         title => format!("{name} {version}: {} compared with MatEval", file.renderer),
         tool => &file.tool, renderer => &file.renderer, dataset => Serde(&file.dataset), agrees => file.agrees,
-        verdict => verdict(file), faults => faults(file), scenes,
+        verdict => verdict(file), scenes,
     };
-    pages::single(TEMPLATE, values, "")
+    pages::single(INDEX, values, pages::SORT)
+}
+
+/// The class of a verdict on a page.
+fn class(counts: Counts) -> &'static str {
+    match (counts.faults, counts.open) {
+        (0, 0) => "good",
+        (0, _) => "",
+        _ => "bad",
+    }
+}
+
+/// Writes the page of a scene: its verdict, its checks and its pictures.
+pub(super) fn write_scene(
+    out: &Path,
+    file: &CompareFile,
+    scene: &SceneComparison,
+    previews: &[ViewPreviews],
+) -> Result<(), PrepError> {
+    let views: Vec<_> = scene
+        .views
+        .iter()
+        .map(|view| {
+            let shown = previews.iter().find(|shown| shown.view == view.view.as_str());
+            let has = |is: fn(State) -> bool| view.checks.iter().any(|check| is(check.state));
+            let (word, class) = match (has(State::is_fault), has(State::is_open)) {
+                (true, _) => ("does not agree", "bad"),
+                (false, true) => ("agrees in part", ""),
+                (false, false) => ("agrees", "good"),
+            };
+            context! { view => view.view.as_str(), word, class, checks => Serde(&view.checks), shown => Serde(shown) }
+        })
+        .collect();
+    let kinds: Vec<&str> = scene.kinds.iter().map(|kind| kind.word()).collect();
+    let checks: Vec<&Check> = scene.views.iter().flat_map(|view| &view.checks).collect();
+    let DatasetVersion { name, version, .. } = &file.dataset;
+    let values = context! {
+        title => format!("{} of {name} {version}: {} compared with MatEval", scene.scene, file.renderer),
+        scene => scene.scene.as_str(), renderer => &file.renderer, kinds, views,
+        class => class(Counts::of(scene)), verdict => counted(&checks, &file.renderer),
+        tile_bound => 100.0 * scene.tile_bound, samples => scene.samples_each_half(),
+        source => scene.source_materials.as_ref().map(source_sentence),
+    };
+    let folder = out.join(scene_folder(&scene.scene));
+    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+    let page = pages::single(SCENE, values, "");
+    Ok(mateval_files::whole::write_whole(&folder.join("index.html"), page.as_bytes())?)
 }
 
 /// How far the converted materials of a scene are from the source's own.
@@ -86,13 +132,15 @@ const APART: [u8; 3] = [150, 150, 150];
 /// The previews of a view.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ViewPreviews {
+    /// Folder of the scene's page.
     #[serde(skip)]
     out: PathBuf,
-    /// Folder of the pictures, relative to the page.
-    folder: String,
     #[serde(skip)]
     exposure: f64,
     pub(super) view: String,
+    /// The pictures that are shown; all where absent.
+    #[serde(skip)]
+    only: Option<BTreeSet<String>>,
     /// One row per picture.
     rows: Vec<Row>,
 }
@@ -128,13 +176,24 @@ struct Shown {
 }
 
 impl ViewPreviews {
-    /// Creates the view's folder below `out`.
-    pub(super) fn new(out: &Path, scene: &SceneFile, view: &ViewId) -> Result<Self, PrepError> {
-        let folder = format!("pictures/{}/{view}", scene.id);
-        let place = out.join(&folder);
+    /// Creates the view's folder below `out`. Unless `whole`, only pictures with a check that speaks against them are
+    /// shown: a scene has dozens of others in each view.
+    pub(super) fn new(out: &Path, scene: &SceneFile, found: &ViewComparison, whole: bool) -> Result<Self, PrepError> {
+        let out = out.join(scene_folder(&scene.id));
+        let place = out.join(found.view.as_str());
         std::fs::create_dir_all(&place).map_err(FileError::io("make", &place))?;
-        let (out, view) = (out.to_owned(), view.to_string());
-        Ok(Self { out, folder, exposure: scene.exposure, view, rows: Vec::new() })
+        let faults = found.checks.iter().filter(|check| check.state.is_fault());
+        let shown_by = |check: &Check| match check.picture.as_str() {
+            "silhouette" => "instance".to_owned(),
+            "rgb_a" | "rgb_b" => "rgb".to_owned(),
+            other => other.to_owned(),
+        };
+        let only = (!whole).then(|| faults.map(shown_by).collect());
+        Ok(Self { out, exposure: scene.exposure, view: found.view.to_string(), only, rows: Vec::new() })
+    }
+
+    fn shows(&self, picture: &str) -> bool {
+        self.only.as_ref().is_none_or(|only| only.contains(picture))
     }
 
     /// Adds RGB or a light group: the mean of the halves, not the denoised picture.
@@ -145,6 +204,9 @@ impl ViewPreviews {
         kinds: &ShownKinds,
         bound: f64,
     ) -> Result<(), PrepError> {
+        if !self.shows(&light.picture) {
+            return Ok(());
+        }
         let scale = light.means[0];
         let level = scale.iter().sum::<f64>() / 3.0;
         let (gain, note) = self.gain(light, level);
@@ -177,18 +239,18 @@ impl ViewPreviews {
 
     /// Adds the pictures without light that Blender made.
     pub(super) fn add_geometry(&mut self, ours: &OurGeometry, theirs: &TheirGeometry) -> Result<(), PrepError> {
-        if let Some(base_color) = &theirs.base_color {
+        if let Some(base_color) = theirs.base_color.as_ref().filter(|_| self.shows("base_color")) {
             self.add_base_color(ours, base_color)?;
         }
-        if let Some(depth) = &theirs.depth {
+        if let Some(depth) = theirs.depth.as_ref().filter(|_| self.shows("depth")) {
             self.add_depth(&ours.depth, depth)?;
         }
-        if let Some(normal) = &theirs.normal {
+        if let Some(normal) = theirs.normal.as_ref().filter(|_| self.shows("normal")) {
             self.add_normal(&ours.normal, normal)?;
         }
         let ids = [("instance", &ours.instance, &theirs.instance), ("part", &ours.part, &theirs.part)];
         for (name, ours, theirs) in ids {
-            if let Some(theirs) = theirs {
+            if let Some(theirs) = theirs.as_ref().filter(|_| self.shows(name)) {
                 self.add_ids(name, ours, theirs)?;
             }
         }
@@ -236,7 +298,7 @@ impl ViewPreviews {
         };
         let width = ours.width();
         let picture = Picture::from_fn(width, ours.height(), |x, y| color(y * width + x));
-        let title = "red: ids differ; grey: ids differ at an edge, which does not count".to_owned();
+        let title = "red: ids differ; grey: ids differ at an edge".to_owned();
         let shown = Shown { suffix: "difference", title, low: String::new(), high: String::new(), picture };
         self.add(name, "one colour per id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])
     }
@@ -250,7 +312,7 @@ impl ViewPreviews {
         differences: Vec<Shown>,
     ) -> Result<(), PrepError> {
         let file = |suffix: &str, shown: &Picture<[u8; 3]>| {
-            let file = format!("{}/{picture}_{suffix}.png", self.folder);
+            let file = format!("{}/{picture}_{suffix}.png", self.view);
             write_rgb_bytes(&self.out.join(&file), shown)?;
             Ok::<_, PrepError>(file)
         };
@@ -302,14 +364,14 @@ fn tile_map(
     scale: [f64; 3],
 ) -> Picture<[u8; 3]> {
     let mut map = Picture::filled(width, height, DIVERGING[1]);
-    for (tile, decides) in kinds.all() {
-        let off = difference(ours, theirs, tile.pixels());
-        let channel = off.worst_channel(bound, scale);
+    let allowed = Tolerance::of_tile(bound);
+    for ((tile, decides), off) in kinds.all().zip(kinds.differences([ours, theirs])) {
+        let channel = off.worst_channel(allowed, scale);
         let value = match scale[channel] > 0.0 {
             true => off.mean[channel] / scale[channel] / (LIGHT_TILE * bound),
             false => f64::from(off.mean[channel] != 0.0),
         };
-        let frame = match (decides, off.is_over(bound, scale)) {
+        let frame = match (decides, off.is_over(allowed, scale)) {
             (false, _) => Some(APART),
             (true, true) => Some([20; 3]),
             (true, false) => None,

@@ -1,7 +1,5 @@
-//! The two renderers' pictures: reads Blender's, decides how many samples ours take, and renders ours.
-//!
-//! Ours take as few samples as leave the decision to Blender's noise or to the bound. A pilot of few samples measures
-//! our noise in each tile. It falls in proportion to the number of samples.
+//! The two renderers' pictures: reads Blender's, and renders ours in passes, so that samples can be added until the checks
+//! are decided.
 
 use std::path::{Path, PathBuf};
 
@@ -13,9 +11,8 @@ use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
 use mateval_tracer::{RenderSettings, ViewLight, World, render_views};
 
-use super::file::{BOUNDS, Check, State, file_check};
-use super::light::ShownKinds;
-use super::tiles::{Halves, Tile, median};
+use super::file::{Check, State, file_check};
+use super::tiles::Halves;
 use crate::error::PrepError;
 
 /// The folder of Blender's pictures of a view.
@@ -54,6 +51,12 @@ impl TheirView {
         self.read(picture, file, exr_io::read_linear)
     }
 
+    /// Samples per pixel of each half.
+    pub(super) fn samples(&self) -> Result<u32, PrepError> {
+        let render: RenderFile = json::read(&self.folder.join(RENDER_FILE))?;
+        Ok(render.samples_each_half)
+    }
+
     /// Reads `<picture>_a.exr` and `<picture>_b.exr`.
     pub(super) fn halves(&self, picture: &str) -> Result<Halves, Check> {
         let [a, b] = ["a", "b"].map(|half| self.linear(picture, &format!("{picture}_{half}.exr")));
@@ -69,10 +72,12 @@ pub(super) struct OurLight {
     pub(super) groups: Vec<Halves>,
 }
 
-/// The seeds of a scene's two halves. No other render of the scene uses them, so that the errors are independent.
-pub(super) fn seeds(scene: &SceneId) -> [u64; 2] {
+/// The seeds of the two halves of a scene's pass. No other render of the scene uses them, so that the errors are
+/// independent.
+pub(super) fn seeds(scene: &SceneId, pass: usize) -> [u64; 2] {
     ["a", "b"].map(|half| {
-        let text = sha256_of_bytes(format!("compare/{scene}/{half}").as_bytes());
+        let number = if pass == 0 { String::new() } else { format!("/{pass}") };
+        let text = sha256_of_bytes(format!("compare/{scene}/{half}{number}").as_bytes());
         u64::from_str_radix(&text[..16], 16).expect("a hash is hexadecimal")
     })
 }
@@ -81,13 +86,73 @@ pub(super) fn seeds(scene: &SceneId) -> [u64; 2] {
 /// pixels.
 const MOST_BYTES: u64 = 2 << 30;
 
+/// The built-in tracer's pictures of a scene's views, to which passes are added.
+pub(super) struct OurRender {
+    /// The samples per pixel of each half, by pass.
+    passes: Vec<u32>,
+    /// In the order of the views; empty before the first pass.
+    pub(super) lights: Vec<OurLight>,
+}
+
+impl OurRender {
+    pub(super) fn new() -> Self {
+        Self { passes: Vec::new(), lights: Vec::new() }
+    }
+
+    pub(super) fn passes(&self) -> &[u32] {
+        &self.passes
+    }
+
+    /// Samples per pixel of each half, of all passes.
+    pub(super) fn samples(&self) -> u32 {
+        self.passes.iter().sum()
+    }
+
+    /// Renders another pass.
+    pub(super) fn add(
+        &mut self,
+        world: &World,
+        id: &SceneId,
+        views: &[&View],
+        samples: u32,
+        progress: Progress<'_>,
+    ) -> Result<(), PrepError> {
+        let added = render_pass(world, id, views, samples, seeds(id, self.passes.len()), progress)?;
+        let share = f64::from(samples) / f64::from(self.samples() + samples);
+        match self.lights.is_empty() {
+            true => self.lights = added,
+            false => self.lights.iter_mut().zip(&added).for_each(|(all, added)| all.blend(added, share)),
+        }
+        self.passes.push(samples);
+        Ok(())
+    }
+}
+
+impl OurLight {
+    /// Moves every picture towards `other` by this share of the way.
+    fn blend(&mut self, other: &Self, share: f64) {
+        let own = std::iter::once(&mut self.rgb).chain(&mut self.groups);
+        for (own, other) in own.zip(std::iter::once(&other.rgb).chain(&other.groups)) {
+            for (own, other) in [(&mut own.a, &other.a), (&mut own.b, &other.b)] {
+                for (own, other) in own.pixels_mut().iter_mut().zip(other.pixels()) {
+                    for c in 0..3 {
+                        let [from, to] = [own.0[c], other.0[c]].map(f64::from);
+                        own.0[c] = (from + share * (to - from)) as f32;
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Renders `views` of the scene: all from one set of paths where they share a centre and their pictures fit in memory,
 /// otherwise one after the other.
-pub(super) fn render_ours(
+fn render_pass(
     world: &World,
     id: &SceneId,
     views: &[&View],
     samples: u32,
+    seeds: [u64; 2],
     progress: Progress<'_>,
 ) -> Result<Vec<OurLight>, PrepError> {
     let settings = RenderSettings { samples, max_bounces: MAX_BOUNCES, ..Default::default() };
@@ -107,7 +172,7 @@ pub(super) fn render_ours(
         }
         let step = format!("{id} ours");
         let shown = |done: usize, all: usize| progress(Report::step(&step, pass * all + done, passes * all));
-        let rendered = render_views(world, cameras, &settings, &seeds(id), &shown)?;
+        let rendered = render_views(world, cameras, &settings, &seeds, &shown)?;
         found.extend(rendered.views.iter().map(light_of));
     }
     Ok(found)
@@ -120,78 +185,34 @@ fn light_of(view: &ViewLight) -> OurLight {
     OurLight { rgb: Halves { a: a.sum(), b: b.sum() }, groups }
 }
 
-/// Samples per pixel of each half of the pilot, and the least number that is chosen.
-pub(super) const PILOT: u32 = 8;
-
-/// Where three of our standard errors are below this share of the bound, fewer of them would decide nothing.
-const SHARE_OF_BOUND: f64 = 0.5;
-
-/// The largest number of samples that Blender has rendered any of the views with.
-pub(super) fn most_samples(views: &[TheirView]) -> Result<u32, PrepError> {
-    let mut most = 1;
-    for view in views {
-        let render: RenderFile = json::read(&view.folder.join(RENDER_FILE))?;
-        most = most.max(render.samples_each_half);
-    }
-    Ok(most)
-}
-
-/// The number of samples at which the pictures of a view are noisy enough for its comparison, from its pilot. A picture
-/// of Blender's that cannot be read asks for none; its check reports it.
-pub(super) fn wanted_samples(pilot: &OurLight, theirs: &TheirView, shown: &ShownKinds, bound: f64) -> u32 {
-    let groups = pilot.groups.iter().enumerate().map(|(at, group)| (format!("group_{at:02}"), group));
-    let pictures = std::iter::once(("rgb".to_owned(), &pilot.rgb)).chain(groups);
-    let of_picture = |(name, ours): (String, &Halves)| {
-        let theirs = theirs.halves(&name).ok()?;
-        ratio([ours, &theirs], shown, bound)
-    };
-    let most = pictures.filter_map(of_picture).fold(0.0, f64::max);
-    (f64::from(PILOT) * most).ceil() as u32
-}
-
-/// By how much our variance exceeds what is allowed, in the median tile; absent if no tile decides. Allowed is
-/// Blender's own variance, or that at which [`SHARE_OF_BOUND`] is met.
-fn ratio([ours, theirs]: [&Halves; 2], shown: &ShownKinds, bound: f64) -> Option<f64> {
-    let scale = ours.means(shown.counted());
-    let of_tile = |tile: &Tile| {
-        let [own, other] = [ours, theirs].map(|halves| halves.variance(tile.pixels()));
-        let ratio = |c: usize| {
-            let allowed = other[c].max((SHARE_OF_BOUND * bound * scale[c] / BOUNDS.standard_errors).powi(2));
-            if allowed > 0.0 { own[c] / allowed } else { 0.0 }
-        };
-        (0..3).map(ratio).fold(0.0, f64::max)
-    };
-    median(shown.all().filter(|(_, decides)| *decides).map(|(tile, _)| of_tile(tile)).collect())
-}
-
 #[cfg(test)]
 mod tests {
-    use mateval_image::{LinearRgb, Mask, Picture};
+    use mateval_image::{LinearRgb, Picture};
 
     use super::*;
-    use crate::compare::file::MaterialKind;
 
-    /// Halves of a grey picture that differ by this much in each pixel.
-    fn halves(apart: f32) -> Halves {
-        let half =
-            |sign: f32| Picture::from_fn(32, 32, |x, _| LinearRgb([0.5 + sign * apart * (-1_f32).powi(x as i32); 3]));
-        Halves { a: half(0.5), b: half(-0.5) }
+    /// Passes of 16, 16 and 32 samples count in proportion to their samples.
+    #[test]
+    fn passes_count_by_their_samples() {
+        let light = |value: f32| {
+            let halves = || Halves {
+                a: Picture::filled(2, 2, LinearRgb([value; 3])),
+                b: Picture::filled(2, 2, LinearRgb([value + 1.0; 3])),
+            };
+            OurLight { rgb: halves(), groups: vec![halves()] }
+        };
+        let mut all = light(0.0);
+        all.blend(&light(4.0), 0.5);
+        all.blend(&light(8.0), 0.5);
+        for halves in [&all.rgb, &all.groups[0]] {
+            assert_eq!((halves.a.pixels()[3], halves.b.pixels()[3]), (LinearRgb([5.0; 3]), LinearRgb([6.0; 3])));
+        }
     }
 
     #[test]
-    fn samples_follow_the_larger_of_their_noise_and_the_bound() {
-        let shown = ShownKinds::new(&Picture::filled(32, 32, 1), &[MaterialKind::Lambert], &Mask::filled(32, 32, true));
-        let ratio = |ours: f32, theirs: f32| ratio([&halves(ours), &halves(theirs)], &shown, 0.01).unwrap();
-        // As noisy as theirs.
-        assert!((ratio(0.4, 0.4) - 1.0).abs() < 1e-4);
-        // Twice and half the noise: four times and a quarter of the samples.
-        assert!((ratio(0.4, 0.2) - 4.0).abs() < 1e-3);
-        assert!((ratio(0.2, 0.4) - 0.25).abs() < 1e-4);
-        // Without noise of theirs: three standard errors of 16 * 16 pixels, each off by 0.1 / 2, against 0.5 * 0.01 *
-        // 0.5.
-        let errors: f64 = 3.0 * (0.1 / 2.0) / 16.0;
-        let expected = (errors / 0.0025).powi(2);
-        assert!((ratio(0.1, 0.0) / expected - 1.0).abs() < 1e-3);
-        assert_eq!(ratio(0.0, 0.0), 0.0);
+    fn no_two_passes_share_a_seed() {
+        let id = SceneId::new("room").unwrap();
+        let all: std::collections::BTreeSet<u64> = (0..4).flat_map(|pass| seeds(&id, pass)).collect();
+        assert_eq!(all.len(), 8);
     }
 }

@@ -3,16 +3,30 @@
 use mateval_dataset::progress::{Table, fitted, row};
 use mateval_files::untrusted;
 
-use super::file::{Check, CompareFile, LightComparison, Quantity, SceneComparison, State, ViewComparison};
+use super::file::{
+    Check, CompareFile, LightComparison, Quantity, SamplesToDecide, SceneComparison, State, ViewComparison,
+};
 
-/// The tables, then every check that does not agree, then the verdict, for a terminal of `columns`; of any width if
-/// absent.
+/// Up to so many scenes every view and picture has a row of its own.
+const SCENES_IN_FULL: usize = 3;
+
+/// Up to so many checks that do not agree are printed; the page of a scene lists them all.
+const MOST_FAULTS: usize = 40;
+
+/// The tables, then the checks that do not agree, then the verdict, for a terminal of `columns`; of any width if absent.
 pub fn text(file: &CompareFile, columns: Option<usize>) -> String {
-    let tables =
-        [geometry(file), light(file), apart(file), source_materials(file)].map(|table| table.text(columns)).join("\n");
-    let faults: String = faults(file).iter().map(|fault| format!("{fault}\n")).collect();
-    let gap = if faults.is_empty() { "" } else { "\n" };
-    let rest = format!("{gap}{faults}\n{}\n", verdict(file));
+    let tables = match file.scenes.len() {
+        ..=SCENES_IN_FULL => vec![geometry(file), light(file), apart(file), source_materials(file)],
+        _ => vec![scenes(file)],
+    };
+    let tables = tables.iter().map(|table| table.text(columns)).collect::<Vec<_>>().join("\n");
+    let faults = faults(file);
+    let mut lines: Vec<String> = faults.iter().take(MOST_FAULTS).map(|fault| format!("{fault}\n")).collect();
+    if faults.len() > MOST_FAULTS {
+        lines.push(format!("{} more; --out and --format json list them all\n", faults.len() - MOST_FAULTS));
+    }
+    let gap = if lines.is_empty() { "" } else { "\n" };
+    let rest = format!("{gap}{}\n{}\n", lines.concat(), verdict(file));
     tables
         + &match columns {
             Some(columns) => fitted(&rest, columns),
@@ -20,9 +34,9 @@ pub fn text(file: &CompareFile, columns: Option<usize>) -> String {
         }
 }
 
-/// One line for every check that does not agree.
+/// One line for every check that speaks against the pictures. Those that decide nothing are counted by [`verdict`].
 pub fn faults(file: &CompareFile) -> Vec<String> {
-    let faults = file.checks().filter(|(_, _, check)| check.state != State::Agrees);
+    let faults = file.checks().filter(|(_, _, check)| check.state.is_fault());
     faults.map(|(scene, view, check)| format!("{scene} {view}: {check}")).collect()
 }
 
@@ -31,24 +45,91 @@ pub fn verdict(file: &CompareFile) -> String {
     if file.scenes.is_empty() {
         return "nothing was compared: every scene has a photo from elsewhere".to_owned();
     }
-    let count = |state: State| file.checks().filter(|(_, _, check)| check.state == state).count();
-    let all = file.checks().count();
-    let others = [
-        (State::Differs, "differ"),
-        (State::TooNoisy, "too noisy"),
-        (State::Undecided, "undecided"),
-        (State::Missing, "missing"),
-        (State::Unreadable, "unreadable"),
-    ];
-    let others = others.into_iter().map(|(state, word)| (count(state), word)).filter(|(count, _)| *count > 0);
-    let others: Vec<String> = others.map(|(count, word)| format!("{count} {word}")).collect();
-    let rest = if others.is_empty() { String::new() } else { format!(", {}", others.join(", ")) };
     let verdict = if file.agrees { "agrees" } else { "does NOT agree" };
-    format!(
-        "{} {verdict} with the built-in tracer: {} of {all} checks agree{rest}",
-        file.renderer,
-        count(State::Agrees)
-    )
+    let checks: Vec<&Check> = file.checks().map(|(_, _, check)| check).collect();
+    format!("{} {verdict} with the built-in tracer: {}", file.renderer, counted(&checks, &file.renderer))
+}
+
+/// As in "70 of 75 checks agree, 5 undecided (too noisy): 256 samples ... would decide 5".
+pub(super) fn counted(checks: &[&Check], renderer: &str) -> String {
+    let count = |state: State| checks.iter().filter(|check| check.state == state).count();
+    let faults = [(State::Differs, "differ"), (State::Missing, "missing"), (State::Unreadable, "unreadable")];
+    let mut parts = vec![format!("{} of {} checks agree", count(State::Agrees), checks.len())];
+    parts.extend(
+        faults
+            .map(|(state, word)| (count(state), word))
+            .iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, word)| format!("{n} {word}")),
+    );
+    let open =
+        [(State::TooNoisy, "too noisy"), (State::TooFew, "of too few samples"), (State::Undecided, "without pixels")];
+    let open = open.map(|(state, word)| (count(state), word));
+    let reasons: Vec<String> = open.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
+    if !reasons.is_empty() {
+        let all: usize = open.iter().map(|(n, _)| n).sum();
+        parts.push(format!("{all} undecided ({})", reasons.join(", ")));
+    }
+    let decidable: Vec<SamplesToDecide> = checks.iter().filter_map(|check| check.to_decide).collect();
+    let most = |of: fn(&SamplesToDecide) -> u32| decidable.iter().map(of).max().unwrap_or_default();
+    let hint = match decidable.len() {
+        0 => String::new(),
+        n => format!(
+            "; {} samples per pixel of each half of {renderer}'s, and {} of the built-in tracer's, would decide {n}",
+            most(|needed| needed.theirs),
+            most(|needed| needed.ours)
+        ),
+    };
+    parts.join(", ") + &hint
+}
+
+/// One row per scene.
+fn scenes(file: &CompareFile) -> Table {
+    let mut rows = vec![row(["scene", "verdict", "agree", "differ", "undecided", "samples"])];
+    for scene in &file.scenes {
+        let counts = Counts::of(scene);
+        rows.push(row([
+            scene.scene.as_str(),
+            counts.word(),
+            &counts.agree.to_string(),
+            &counts.faults.to_string(),
+            &counts.open.to_string(),
+            &scene.samples_each_half().to_string(),
+        ]));
+    }
+    Table {
+        title: "Checks by scene; samples: of each half of the built-in tracer's pictures".to_owned(),
+        words: 2,
+        rows,
+    }
+}
+
+/// The outcomes of a scene's checks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Counts {
+    pub(super) agree: usize,
+    pub(super) faults: usize,
+    pub(super) open: usize,
+}
+
+impl Counts {
+    pub(super) fn of(scene: &SceneComparison) -> Self {
+        let checks = || scene.views.iter().flat_map(|view| &view.checks);
+        let count = |is: fn(State) -> bool| checks().filter(|check| is(check.state)).count();
+        Self {
+            agree: count(|state| state == State::Agrees),
+            faults: count(State::is_fault),
+            open: count(State::is_open),
+        }
+    }
+
+    pub(super) fn word(self) -> &'static str {
+        match (self.faults, self.open) {
+            (0, 0) => "agrees",
+            (0, _) => "agrees in part",
+            _ => "does NOT agree",
+        }
+    }
 }
 
 fn views(file: &CompareFile) -> impl Iterator<Item = (&SceneComparison, &ViewComparison)> {
@@ -56,7 +137,8 @@ fn views(file: &CompareFile) -> impl Iterator<Item = (&SceneComparison, &ViewCom
 }
 
 fn geometry(file: &CompareFile) -> Table {
-    let mut rows = vec![row(["scene", "view", "base colour", "instances", "parts", "depth", "normals", "group sums"])];
+    let mut rows = vec![row(["scene", "view", "base colour", "instances", "edges", "parts", "depth", "normals"])];
+    rows[0].push("group sums".to_owned());
     for (scene, view) in views(file) {
         let cell = |picture: &str, quantity: Quantity, unit: &dyn Fn(f64) -> String| {
             let check = view.check(picture, quantity);
@@ -67,16 +149,18 @@ fn geometry(file: &CompareFile) -> Table {
         let sums = ["rgb_a", "rgb_b"].map(|half| view.check(half, Quantity::GroupSum).and_then(|check| check.measured));
         let sum =
             sums.into_iter().flatten().fold(None, |most: Option<f64>, sum| Some(most.map_or(sum, |m| m.max(sum))));
-        rows.push(row([
+        let mut cells = row([
             scene.scene.as_str(),
             view.view.as_str(),
             &cell("base_color", Quantity::PsnrDb, &|db| format!("{db:.1} dB")),
             &cell("instance", Quantity::EqualShare, &share),
+            &cell("silhouette", Quantity::EqualShare, &share),
             &cell("part", Quantity::EqualShare, &share),
             &cell("depth", Quantity::MedianM, &|m| format!("{:.3} mm", 1e3 * m)),
             &cell("normal", Quantity::MedianDeg, &|deg| format!("{deg:.2} deg")),
-            &sum.map_or_else(|| "none".to_owned(), |sum| format!("{sum:.0e}")),
-        ]));
+        ]);
+        cells.push(sum.map_or_else(|| "none".to_owned(), |sum| format!("{sum:.0e}")));
+        rows.push(cells);
     }
     Table { title: "Pictures without light, and whether a half's groups sum to it".to_owned(), words: 2, rows }
 }
@@ -122,7 +206,7 @@ fn light(file: &CompareFile) -> Table {
 fn state(view: &ViewComparison, light: &LightComparison) -> State {
     let state = |quantity| view.check(&light.picture, quantity).map_or(State::Undecided, |check| check.state);
     let states = [state(Quantity::TilesOver), state(Quantity::MeanDifference)];
-    let order = [State::Differs, State::TooNoisy, State::Undecided];
+    let order = [State::Differs, State::TooNoisy, State::TooFew, State::Undecided];
     order.into_iter().find(|state| states.contains(state)).unwrap_or(State::Agrees)
 }
 

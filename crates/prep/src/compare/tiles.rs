@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use mateval_image::{LinearRgb, Picture};
 
-use super::file::{BOUNDS, FALSE_ALARM};
+use super::file::{BOUNDS, FALSE_ALARM, SamplesToDecide};
 
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 16;
@@ -31,7 +31,31 @@ pub(super) struct Tile {
 pub(super) struct Difference {
     /// The difference of the means.
     pub(super) mean: [f64; 3],
+    /// Its standard error.
     pub(super) error: [f64; 3],
+    /// The share of its variance that is theirs, 0 to 1; 0 without any noise.
+    pub(super) theirs: [f64; 3],
+}
+
+/// What a difference may be, as shares of a picture's mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tolerance {
+    /// A larger difference is a fault if it exceeds this by `errors` standard errors.
+    pub(super) bound: f64,
+    pub(super) errors: f64,
+    /// A fault that is found where the difference agrees.
+    pub(super) fault: f64,
+}
+
+impl Tolerance {
+    /// That of a tile whose bound this is.
+    pub(super) fn of_tile(bound: f64) -> Self {
+        Self { bound, errors: BOUNDS.standard_errors, fault: BOUNDS.tile_fault * bound }
+    }
+
+    /// That of a picture's mean.
+    pub(super) const PICTURE: Self =
+        Self { bound: BOUNDS.picture_mean, errors: BOUNDS.standard_errors_mean, fault: BOUNDS.picture_mean_fault };
 }
 
 /// Divides a picture into tiles of 16x16 pixels. A remainder of at least 8 pixels at the right or lower edge is a tile
@@ -70,19 +94,6 @@ impl Halves {
         sum.map(|sum| sum / pixels.len().max(1) as f64)
     }
 
-    /// The variance of each channel's mean over these pixels.
-    pub(super) fn variance(&self, pixels: impl Iterator<Item = (usize, usize)>) -> [f64; 3] {
-        let (mut sum, mut count) = ([0.0_f64; 3], 0_usize);
-        for (x, y) in pixels {
-            let [a, b] = [&self.a, &self.b].map(|half| half.get(x, y).0.map(f64::from));
-            for c in 0..3 {
-                sum[c] += ((a[c] - b[c]) / 2.0).powi(2);
-            }
-            count += 1;
-        }
-        sum.map(|sum| sum / (count.max(1) as f64).powi(2))
-    }
-
     /// The mean of the two halves.
     pub(super) fn mean(&self) -> Picture<LinearRgb> {
         let pixel = |(a, b): (&LinearRgb, &LinearRgb)| LinearRgb([0, 1, 2].map(|c| (a.0[c] + b.0[c]) / 2.0));
@@ -97,38 +108,50 @@ pub(super) fn difference(
     theirs: &Halves,
     pixels: impl IntoIterator<Item = (usize, usize)>,
 ) -> Difference {
-    let (mut sum, mut variance, mut count) = ([0.0_f64; 3], [0.0_f64; 3], 0_usize);
+    let (mut sum, mut own, mut other, mut count) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3], 0_usize);
     for (x, y) in pixels {
         let [a, b, p, q] = [&ours.a, &ours.b, &theirs.a, &theirs.b].map(|half| half.get(x, y).0.map(f64::from));
         for c in 0..3 {
             sum[c] += (p[c] + q[c] - a[c] - b[c]) / 2.0;
-            variance[c] += ((a[c] - b[c]) / 2.0).powi(2) + ((p[c] - q[c]) / 2.0).powi(2);
+            own[c] += ((a[c] - b[c]) / 2.0).powi(2);
+            other[c] += ((p[c] - q[c]) / 2.0).powi(2);
         }
         count += 1;
     }
     let count = count.max(1) as f64;
-    Difference { mean: sum.map(|sum| sum / count), error: variance.map(|variance| variance.sqrt() / count) }
+    let variance = |c: usize| own[c] + other[c];
+    Difference {
+        mean: sum.map(|sum| sum / count),
+        error: std::array::from_fn(|c| variance(c).sqrt() / count),
+        theirs: std::array::from_fn(|c| if variance(c) > 0.0 { other[c] / variance(c) } else { 0.0 }),
+    }
 }
 
 impl Difference {
-    /// The difference in each channel divided by what is allowed there: the bound times `scale`, plus three standard
+    /// The difference in each channel divided by what is allowed there: the bound times `scale`, plus the standard
     /// errors. Above 1 the channel is over the bound; a channel that is black in both pictures gives 0.
-    pub(super) fn excess(&self, bound: f64, scale: [f64; 3]) -> [f64; 3] {
+    pub(super) fn excess(&self, allowed: Tolerance, scale: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|c| match self.mean[c].abs() {
             0.0 => 0.0,
-            off => off / (bound * scale[c] + BOUNDS.standard_errors * self.error[c]),
+            off => off / (allowed.bound * scale[c] + allowed.errors * self.error[c]),
         })
     }
 
     /// The channel with the largest [`Self::excess`].
-    pub(super) fn worst_channel(&self, bound: f64, scale: [f64; 3]) -> usize {
-        let excess = self.excess(bound, scale);
+    pub(super) fn worst_channel(&self, allowed: Tolerance, scale: [f64; 3]) -> usize {
+        let excess = self.excess(allowed, scale);
         (1..3).fold(0, |worst, c| if excess[c] > excess[worst] { c } else { worst })
     }
 
     /// Whether any channel is over the bound.
-    pub(super) fn is_over(&self, bound: f64, scale: [f64; 3]) -> bool {
-        self.excess(bound, scale).iter().any(|excess| *excess > 1.0)
+    pub(super) fn is_over(&self, allowed: Tolerance, scale: [f64; 3]) -> bool {
+        self.excess(allowed, scale).iter().any(|excess| *excess > 1.0)
+    }
+
+    /// Whether a fault could hide in the noise of a channel: the difference and three standard errors exceed it.
+    pub(super) fn is_open(&self, allowed: Tolerance, scale: [f64; 3]) -> bool {
+        let reach = |c: usize| self.mean[c].abs() + BOUNDS.standard_errors * self.error[c];
+        (0..3).any(|c| reach(c) > allowed.fault * scale[c])
     }
 
     /// Three standard errors divided by the bound, in the channel with the largest quotient; absent if `scale` is 0
@@ -138,31 +161,89 @@ impl Difference {
         (0..3).filter_map(of).max_by(f64::total_cmp)
     }
 
+    /// The samples with which every channel would be decided, if the difference stays what it is: either it is over the
+    /// bound, or no fault can hide. `samples` are ours and theirs. Absent where no number would, in a channel that is
+    /// black in our picture.
+    pub(super) fn to_decide(
+        &self,
+        allowed: Tolerance,
+        scale: [f64; 3],
+        samples: SamplesToDecide,
+    ) -> Option<SamplesToDecide> {
+        let mut needed = samples;
+        for c in (0..3).filter(|c| self.error[*c] > 0.0) {
+            let off = self.mean[c].abs();
+            let error = ((allowed.fault * scale[c] - off) / BOUNDS.standard_errors)
+                .max((off - allowed.bound * scale[c]) / allowed.errors);
+            if error <= 0.0 {
+                return None;
+            }
+            // By how much the variance has to fall; and to which part of it more samples of ours can contribute.
+            let factor = (self.error[c] / error).powi(2);
+            let theirs = factor * self.theirs[c];
+            let own = factor * (1.0 - self.theirs[c]) / (1.0 - theirs);
+            let of = |count: u32, factor: f64| (f64::from(count) * factor.max(1.0)).ceil() as u32;
+            let more = match theirs < 1.0 && own <= MOST_OF_OURS {
+                true => SamplesToDecide { ours: of(samples.ours, own), ..samples },
+                false => SamplesToDecide { ours: of(samples.ours, factor), theirs: of(samples.theirs, factor) },
+            };
+            needed = SamplesToDecide { ours: needed.ours.max(more.ours), theirs: needed.theirs.max(more.theirs) };
+        }
+        Some(needed)
+    }
+
     /// An upper limit of the probability that noise alone puts it over the bound where the expected values are equal:
     /// two tails of a normal distribution in each channel.
-    fn false_alarm(&self, bound: f64, scale: [f64; 3]) -> f64 {
+    fn false_alarm(&self, allowed: Tolerance, scale: [f64; 3]) -> f64 {
         let tails = |c: usize| {
-            let errors = BOUNDS.standard_errors + bound * scale[c] / self.error[c];
+            let errors = allowed.errors + allowed.bound * scale[c] / self.error[c];
             if self.error[c] > 0.0 { libm::erfc(errors / std::f64::consts::SQRT_2) } else { 0.0 }
         };
         (0..3).map(tails).sum::<f64>().min(1.0)
     }
 }
 
+/// Raises the errors of tiles that look less noisy than light of their brightness is: `means` are ours, tile by tile. Where
+/// rare paths bring most of the light, a tile that few of them hit is too dark, and its halves agree nevertheless. The
+/// variance of such light is proportional to its mean, by a factor that is the median over the tiles that decide.
+pub(super) fn raise_errors(tiles: &mut [Difference], means: &[[f64; 3]], decides: &[bool]) {
+    for c in 0..3 {
+        let variances = |tile: &Difference| {
+            let all = tile.error[c] * tile.error[c];
+            [all * (1.0 - tile.theirs[c]), all * tile.theirs[c]]
+        };
+        let deciding = || tiles.iter().zip(means).zip(decides).filter(|(_, decides)| **decides).map(|(tile, _)| tile);
+        let [own, other] = [0, 1].map(|side: usize| {
+            let lit = deciding().filter(|(_, mean)| mean[c] > 0.0);
+            median(lit.map(|(tile, mean)| variances(tile)[side] / mean[c]).collect()).unwrap_or_default()
+        });
+        for (tile, mean) in tiles.iter_mut().zip(means) {
+            let found = variances(tile);
+            let raised = [found[0].max(own * mean[c]), found[1].max(other * mean[c])];
+            let all = raised[0] + raised[1];
+            tile.error[c] = all.sqrt();
+            tile.theirs[c] = if all > 0.0 { raised[1] / all } else { 0.0 };
+        }
+    }
+}
+
+/// More of our samples than this multiple are not worth rendering where theirs are what is noisy.
+const MOST_OF_OURS: f64 = 64.0;
+
 /// How many of the tiles may be over the bound, and how many noise alone puts there on average. Allowed are 1 % of the
-/// tiles, plus the number that noise alone exceeds at most once in 1000 pictures. The latter is 0 where the noise is
+/// tiles, plus the number that noise alone exceeds at most once in 10,000 pictures. The latter is 0 where the noise is
 /// small compared with the bound. Where it is not, three channels at three standard errors would use up the 1 % for
 /// noise.
-pub(super) fn allowance(tiles: &[Difference], bound: f64, scale: [f64; 3]) -> (usize, f64) {
-    let expected = tiles.iter().map(|tile| tile.false_alarm(bound, scale)).sum();
+pub(super) fn allowance(tiles: &[Difference], allowed: Tolerance, scale: [f64; 3]) -> (usize, f64) {
+    let expected = tiles.iter().map(|tile| tile.false_alarm(allowed, scale)).sum();
     ((BOUNDS.tile_share_over * tiles.len() as f64) as usize + poisson_quantile(expected), expected)
 }
 
 /// The smallest k that a Poisson variable of this mean exceeds with a probability of at most [`FALSE_ALARM`].
 fn poisson_quantile(mean: f64) -> usize {
-    // For a large mean the distribution is nearly normal, and 3.3 standard deviations cover its skewness as well.
+    // For a large mean the distribution is nearly normal, and 4 standard deviations cover its skewness as well.
     if mean > 100.0 {
-        return (mean + 3.3 * mean.sqrt()).ceil() as usize;
+        return (mean + 4.0 * mean.sqrt()).ceil() as usize;
     }
     let mut term = libm::exp(-mean);
     let mut below = term;

@@ -19,22 +19,18 @@ use serde::{Deserialize, Serialize};
 use crate::error::{ReportError, fitting};
 use crate::ranking::basis;
 
-/// All states, in the order in which they are counted.
-const STATES: [State; 6] =
-    [State::Agrees, State::Differs, State::TooNoisy, State::Undecided, State::Missing, State::Unreadable];
-
 /// Whether two renderers agree on a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneVerdict {
     /// The program that compared and its version.
     pub tool: String,
-    /// Whether every check of every view agrees.
+    /// Whether every check that could be decided agrees, and every picture could be read.
     pub agrees: bool,
     /// The number of checks in each state that occurs.
     pub checks: Vec<StateCount>,
-    /// One line for every check that does not agree; null where the ground truth is withheld, since the lines state
-    /// measurements of it.
+    /// One line for every check that does not agree or decides nothing; null where the ground truth is withheld, since
+    /// the lines state measurements of it.
     pub faults: Option<Vec<String>>,
 }
 
@@ -56,7 +52,7 @@ impl SceneVerdict {
         Self {
             tool: file.tool.clone(),
             agrees: agrees(scene),
-            checks: STATES.map(count).into_iter().filter(|count| count.checks > 0).collect(),
+            checks: State::ALL.map(count).into_iter().filter(|count| count.checks > 0).collect(),
             faults: Some(faults.map(|(view, check)| format!("{view}: {check}")).collect()),
         }
     }
@@ -64,11 +60,16 @@ impl SceneVerdict {
     pub fn total(&self) -> usize {
         self.checks.iter().map(|count| count.checks).sum()
     }
+
+    /// The number of checks that decide nothing.
+    pub fn undecided(&self) -> usize {
+        self.checks.iter().filter(|count| count.state.is_open()).map(|count| count.checks).sum()
+    }
 }
 
 fn agrees(scene: &SceneComparison) -> bool {
     let mut checks = scene.views.iter().flat_map(|view| &view.checks).peekable();
-    checks.peek().is_some() && checks.all(|check| check.state == State::Agrees)
+    checks.peek().is_some() && !checks.any(|check| check.state.is_fault())
 }
 
 /// Reads verdicts from files, and from the `.json` files of folders and of the folders directly below. Fails with every

@@ -127,8 +127,10 @@ fn compared(file: &ReleaseFile) -> Headline {
     match given {
         0 => plain("not compared".to_owned(), "two renderers, prep compare".to_owned()),
         _ => {
+            let open = file.comparisons().filter(|verdict| verdict.agrees && verdict.undecided() > 0).count();
+            let open = if open > 0 { format!("; some checks of {open} are undecided") } else { String::new() };
             let rest = if given < all { format!("; {} of {all} not compared", all - given) } else { String::new() };
-            let label = format!("compared scenes on which two renderers agree{rest}");
+            let label = format!("compared scenes on which two renderers agree{open}{rest}");
             Headline { value: format!("{agree} of {given}"), label, is_bad: agree < given }
         }
     }

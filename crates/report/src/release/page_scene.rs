@@ -114,7 +114,12 @@ pub(crate) fn plural(count: usize) -> &'static str {
 fn compared(verdict: Option<&SceneVerdict>) -> Verdict {
     match verdict {
         None => Verdict { state: "none", text: "not compared".to_owned(), order: 1 },
-        Some(verdict) if verdict.agrees => Verdict { state: "good", text: "agree".to_owned(), order: 2 },
+        Some(verdict) if verdict.agrees && verdict.undecided() == 0 => {
+            Verdict { state: "good", text: "agree".to_owned(), order: 3 }
+        }
+        Some(verdict) if verdict.agrees => {
+            Verdict { state: "none", text: format!("agree, {} undecided", verdict.undecided()), order: 2 }
+        }
         Some(verdict) => {
             Verdict { state: "bad", text: format!("{} of {} agree", agreeing(verdict), verdict.total()), order: 0 }
         }
@@ -139,6 +144,7 @@ fn words(count: &StateCount) -> &'static str {
         State::Differs if count.checks == 1 => "differs",
         State::Differs => "differ",
         State::TooNoisy => "too noisy",
+        State::TooFew => "of too few samples",
         State::Undecided => "undecided",
         State::Missing => "missing",
         State::Unreadable => "unreadable",
