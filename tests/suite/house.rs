@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, score, stats, verify};
-use super::sample::json;
+use super::sample::{files_below, json};
 use mateval_testkit::faulty_house;
 use mateval_testkit::{copy_folder, kept_folder};
 
@@ -60,6 +60,42 @@ fn sound_rooms_are_accepted_and_the_faulty_one_is_rejected_with_reasons() {
     let rules: Vec<String> = rejections.map(|rejection| rejection["rule"].as_str().unwrap().to_owned()).collect();
     assert_eq!(rules, ["max_intersecting", "max_missing"], "{store}");
     assert_eq!(store["intersecting"].as_array().unwrap().len(), 1, "{store}");
+}
+
+/// Pieces whose records have neither category nor title, as in later releases, are named by `model_info.json`: either set
+/// of camera rules finds the same rooms and cameras as in the house with names. The twin: without that file all pieces
+/// are of one kind.
+#[test]
+fn names_of_pieces_come_from_model_info() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("source");
+    copy_folder(&SURVEYED.source, &source);
+    let houses = files_below(&source.join("house/3D-FRONT"));
+    let mut nameless = 0;
+    for house in houses.iter().filter(|house| house.extension().is_some_and(|extension| extension == "json")) {
+        let path = source.join("house/3D-FRONT").join(house);
+        let mut document = json(&path);
+        for piece in document["furniture"].as_array_mut().unwrap() {
+            let record = piece.as_object_mut().unwrap();
+            nameless += usize::from(record.remove("category").is_some() | record.remove("title").is_some());
+        }
+        std::fs::write(&path, document.to_string()).unwrap();
+    }
+    assert!(nameless > 5, "{nameless}");
+    let rooms = |source: &Path, rules: &str, code: i32| {
+        let out = folder.path().join(format!("survey-{rules}-{code}-{}", source == SURVEYED.source));
+        run(survey_of(source, &out).args(["--camera-rules", rules])).ends_with(code);
+        json(&out.join("survey.json"))["houses"][0]["rooms"].clone()
+    };
+    for rules in ["blenderproc", "3dlg"] {
+        let found = rooms(&source, rules, 0);
+        assert!(found.as_array().unwrap().iter().filter(|room| room["cameras"][0].is_object()).count() == 2, "{found}");
+        assert_eq!(found, rooms(&SURVEYED.source, rules, 0), "{rules}");
+    }
+    std::fs::remove_file(source.join("house/3D-FUTURE-model/model_info.json")).unwrap();
+    for room in rooms(&source, "3dlg", 1).as_array().unwrap() {
+        assert_eq!(room["super_categories"], 1, "{room}");
+    }
 }
 
 #[test]
@@ -242,4 +278,36 @@ fn a_survey_refuses_folders_that_do_not_exist() {
     let house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
     with(&["house/3D-FRONT", house, "--models", "house/3D-FUTURE-model"]);
     assert_eq!(json(&out.join("survey.json"))["houses"].as_array().unwrap().len(), 1);
+}
+
+/// Thirteen generated rooms without the list of models: a warning in each is one line with a count, and the sum of all
+/// findings can be printed later.
+#[test]
+fn many_rooms_print_a_screen() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, dataset) = (folder.path().join("source"), folder.path().join("dataset"));
+    run(mateval().arg("sample").arg(&source).args(["--houses", "13"])).ends_with(0);
+    std::fs::remove_file(source.join("house/3D-FUTURE-model/model_info.json")).unwrap();
+    let recipe = source.join("recipe.toml");
+    let text = std::fs::read_to_string(&recipe).unwrap();
+    let small = text.replace("resolution = [320, 240]", "resolution = [32, 24]\natlas_size = 64");
+    std::fs::write(&recipe, small).unwrap();
+    let built = run(&mut build(&recipe, &dataset)).ends_with(0).prints("13 scenes");
+    let lines: Vec<&str> = built.stderr.lines().filter(|line| line.contains('[')).collect();
+    let warning = "warning [missing_file], 13 findings in 13 scenes; first in living000: ";
+    assert_eq!(lines.iter().filter(|line| line.starts_with(warning)).count(), 1, "{}", built.stderr);
+    assert!(lines.len() <= 12 && built.stderr.lines().count() <= 40, "{}", built.stderr);
+    assert!(built.stderr.contains("each scene.json lists its own"), "{}", built.stderr);
+    let found = run(stats(&dataset).args(["--findings", "--format", "json"])).ends_with(0);
+    let found: Value = serde_json::from_str(&found.stdout).unwrap();
+    let code = found["codes"].as_array().unwrap().iter().find(|code| code["code"] == "missing_file").unwrap();
+    assert_eq!(
+        (&code["findings"], &code["scenes"], &code["first_scene"]),
+        (&13.into(), &13.into(), &"living000".into())
+    );
+    assert_eq!(found["scenes"].as_array().unwrap().len(), 13);
+    run(stats(&dataset).arg("--findings")).ends_with(0).prints("missing_file");
+    run(stats(&dataset).args(["--findings", "--picture", "x.svg"])).ends_with(2).says("cannot be used with");
+    // Run again, the scenes that are there are a count.
+    run(&mut build(&recipe, &dataset)).ends_with(0).says("13 of 13 scenes were already made");
 }

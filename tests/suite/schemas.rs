@@ -16,6 +16,7 @@ use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
 use mateval_prep::compare::file::CompareFile;
 use mateval_prep::stats::StatsFile;
+use mateval_prep::stats::findings::FindingsFile;
 use mateval_prep::survey::SurveyFile;
 use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::entries::ErrataFile;
@@ -41,7 +42,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 /// The JSON Schema of every kind of JSON file, made from the Rust type that reads and writes it.
-fn schemas() -> [(&'static str, Schema); 29] {
+fn schemas() -> [(&'static str, Schema); 30] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -63,6 +64,7 @@ fn schemas() -> [(&'static str, Schema); 29] {
         ("votes", schema_for!(VotesFile)),
         ("preferences", schema_for!(Preferences)),
         ("stats", schema_for!(StatsFile)),
+        ("findings", schema_for!(FindingsFile)),
         ("release", schema_for!(ReleaseFile)),
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),

@@ -18,7 +18,7 @@ GROUPS = {
     "Ground truth": ["reference", "source_materials", "lights", "material_classes", "render", "scorer"],
     "Submissions and results": ["submission", "lint", "result", "rounded", "verification", "explain", "leaderboard", "errata", "votes",
                                 "preferences"],
-    "Reports of a dataset": ["survey", "stats", "compare", "release"],
+    "Reports of a dataset": ["survey", "stats", "findings", "compare", "release"],
     "Baselines": ["encoding", "import", "import_materials"],
     "Between MatEval and Blender": ["blender_job", "blender_result"],
 }

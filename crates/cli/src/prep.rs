@@ -169,19 +169,30 @@ pub struct StatsArgs {
     /// SVG file for a chart of the counts; must lie outside the dataset.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
+    /// Sum up the findings about the sources instead, by code and by scene.
+    #[arg(long, conflicts_with = "picture")]
+    findings: bool,
     /// Replace a chart that already exists.
     #[arg(long, requires = "picture")]
     force: bool,
 }
 
 impl StatsArgs {
-    /// Counts, draws the chart where one is asked for, and prints the counts.
+    /// Counts, draws the chart where one is asked for, and prints the counts or the findings.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         if let Some(picture) = &self.picture {
             check_outside_datasets(picture, "--picture")?;
             check_output_file(picture, "--picture", "picture", self.force)?;
         }
         let dataset = open_dataset(&self.dataset)?;
+        if self.findings {
+            let found = stats::findings::findings(&dataset, TOOL);
+            match self.format {
+                Format::Json => print(&json::to_text(&found))?,
+                Format::Text => print(&stats::findings::text(&found, columns()))?,
+            }
+            return Ok(Outcome::Good);
+        }
         let mut counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
         counted.look = stats::look::look(&dataset)?;
         if let Some(picture) = &self.picture {

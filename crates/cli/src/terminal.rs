@@ -92,8 +92,14 @@ pub fn with_progress<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
     result
 }
 
-/// The least time between two lines of progress.
-const PAUSE: Duration = Duration::from_secs(10);
+/// The least and the most time between two lines of progress. Between them it is a tenth of the time elapsed, so that the
+/// log of a day's work has a hundred lines or two.
+const PAUSE: [Duration; 2] = [Duration::from_secs(10), Duration::from_secs(600)];
+
+/// The time between two lines of progress after this time.
+fn pause(elapsed: Duration) -> Duration {
+    (elapsed / 10).clamp(PAUSE[0], PAUSE[1])
+}
 
 struct Bars {
     bar: ProgressBar,
@@ -107,6 +113,7 @@ struct State {
     part: String,
     /// The pace of the pieces that the bar counts, from which the remaining time is estimated.
     measure: Option<Measure>,
+    begun: Instant,
     /// When the last line was printed where stderr is no terminal.
     printed: Instant,
 }
@@ -148,7 +155,8 @@ impl Bars {
         if let Ok(style) = ProgressStyle::with_template(&template) {
             bar.set_style(style);
         }
-        let state = State { parts: 1, part: String::new(), measure: None, printed: Instant::now() };
+        let now = Instant::now();
+        let state = State { parts: 1, part: String::new(), measure: None, begun: now, printed: now };
         Self { bar, state: Mutex::new(state) }
     }
 
@@ -176,7 +184,7 @@ impl Bars {
             self.bar.set_prefix(measure.time_left(done, total, now));
             state.measure = Some(measure);
         }
-        if self.bar.is_hidden() && state.printed.elapsed() >= PAUSE {
+        if self.bar.is_hidden() && state.printed.elapsed() >= pause(state.begun.elapsed()) {
             state.printed = Instant::now();
             // Many a step names its scene itself.
             let scene = state.part.strip_prefix("scene ").unwrap_or(&state.part);
@@ -199,6 +207,21 @@ fn label(name: &str, count: Option<[usize; 2]>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A minute of work has 6 lines, and a day some 200.
+    #[test]
+    fn lines_of_progress_become_rarer() {
+        let lines = |seconds: u64| {
+            let (mut now, mut count) = (Duration::ZERO, 0);
+            while now <= Duration::from_secs(seconds) {
+                now += pause(now);
+                count += 1;
+            }
+            count - 1
+        };
+        assert_eq!(lines(60), 6);
+        assert!((30..60).contains(&lines(4000)) && (150..250).contains(&lines(86_400)), "{}", lines(86_400));
+    }
 
     #[test]
     fn one_takes_the_singular() {

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use anyhow::{Context as _, bail};
 use clap::builder::TypedValueParser;
-use mateval_dataset::SceneId;
 use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::open::check_outside_datasets;
+use mateval_dataset::{Finding, SceneId, Severity};
 use mateval_eval::light::reference::{RELEASE_SAMPLES, ReferenceOptions, make_references};
 use mateval_files::work_folder::check_free;
 use mateval_prep::build::BuildOptions;
@@ -16,6 +16,7 @@ use mateval_prep::build::upgrade::bring_up_to_date;
 use mateval_prep::perturb::{PerturbOptions, PerturbedScene, perturb};
 use mateval_prep::recipe::MOST_SAMPLES;
 use mateval_prep::render::{BlenderOptions, BlenderProgram, DeviceChoice, RenderOptions, Renderer, RendererKind};
+use mateval_prep::stats::findings::by_code;
 use mateval_prep::survey::rules::{RejectionLists, SelectionRules};
 use mateval_prep::survey::selection::SelectionGoal;
 use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, survey};
@@ -222,15 +223,45 @@ impl BuildArgs {
         };
         let report = with_progress(|progress| mateval_prep::build::build(&options, TOOL, progress))
             .context("cannot build the dataset")?;
-        for scene in &report.resumed {
-            say(&format!("scene '{scene}' was already made by an earlier run"));
-        }
-        for (scene, findings) in &report.findings {
-            say_findings(scene.as_str(), findings, "scene.json");
-        }
+        say_resumed(&report.resumed, report.findings.len());
+        say_found(&report.findings);
         print(&format!("{}: {}\n", self.out.display(), counted(report.findings.len(), "scene")))?;
         say_if_apart(&self.scenes, &self.out);
         Ok(Outcome::Good)
+    }
+}
+
+/// Up to so many lines of one kind are printed; more are counted.
+const MOST_LINES: usize = 12;
+
+/// Names the scenes that an earlier run has made, or counts them.
+fn say_resumed(scenes: &[SceneId], all: usize) {
+    if scenes.len() > MOST_LINES {
+        return say(&format!("{} of {all} scenes were already made by an earlier run", scenes.len()));
+    }
+    for scene in scenes {
+        say(&format!("scene '{scene}' was already made by an earlier run"));
+    }
+}
+
+/// Prints the errors and warnings of all scenes and counts the notes. Where they are many, those of one code are one
+/// line.
+fn say_found(scenes: &[(SceneId, Vec<Finding>)]) {
+    let shown = |finding: &&Finding| finding.severity != Severity::Note;
+    let is_short = scenes.len() <= MOST_LINES
+        && scenes.iter().flat_map(|(_, findings)| findings).filter(shown).count() <= MOST_LINES;
+    if is_short {
+        return scenes.iter().for_each(|(scene, findings)| say_findings(scene.as_str(), findings, "scene.json"));
+    }
+    let found = by_code(scenes.iter().map(|(scene, findings)| (scene, findings.as_slice())));
+    let (notes, grave): (Vec<_>, Vec<_>) = found.into_iter().partition(|found| found.severity == Severity::Note);
+    grave.iter().for_each(|found| say(&found.to_string()));
+    if !notes.is_empty() {
+        let count = notes.iter().map(|found| found.findings).sum();
+        say(&format!("{} of {}", counted(count, "note"), counted(notes.len(), "code")));
+    }
+    if !(grave.is_empty() && notes.is_empty()) {
+        say("each scene.json lists its own; `mateval prep stats DATASET --findings` sums up by scene");
     }
 }
 

@@ -1,8 +1,10 @@
 //! Counts what a dataset contains: the numbers of the paper's Table I, and those behind them.
 //!
 //! In: an open dataset, but only its `dataset.json` and the `scene.json` of each scene. Out: [`StatsFile`], which
-//! [`show`] prints as tables and draws as a chart. [`look`](look::look) adds how the true albedo of input views looks.
+//! [`show`] prints as tables and draws as a chart. [`look`](look::look) adds how the true albedo of input views looks;
+//! [`findings`](findings::findings) sums up the findings about the sources.
 
+pub mod findings;
 pub mod look;
 pub mod show;
 
