@@ -107,23 +107,18 @@ pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) ->
     if cloud.is_empty() {
         return false;
     }
-    let size = known.atlas.size();
-    let found: Vec<Option<Values>> = {
-        let known = &*known;
-        let unseen = |at: usize| match (known.texels.pixels()[at], known.atlas.owner(at % size, at / size)) {
-            (Texel::Unseen, Some((triangle, _))) => {
-                let centre = DVec2::new((at % size) as f64 + 0.5, (at / size) as f64 + 0.5);
-                cloud.values_at(place_of(&known.atlas, mesh, triangle, centre), mesh.geometric_normal(triangle))
+    let PartialAtlas { atlas, texels } = known;
+    let size = atlas.size();
+    texels.pixels_mut().par_chunks_mut(size).enumerate().for_each(|(y, row)| {
+        for (x, texel) in row.iter_mut().enumerate().filter(|(_, texel)| **texel == Texel::Unseen) {
+            let Some((triangle, _)) = atlas.owner(x, y) else { continue };
+            let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+            let place = place_of(atlas, mesh, triangle, centre);
+            if let Some(values) = cloud.values_at(place, mesh.geometric_normal(triangle)) {
+                *texel = Texel::Seen(values);
             }
-            _ => None,
-        };
-        (0..size * size).into_par_iter().map(unseen).collect()
-    };
-    for (texel, value) in known.texels.pixels_mut().iter_mut().zip(found) {
-        if let Some(value) = value {
-            *texel = Texel::Seen(value);
         }
-    }
+    });
     true
 }
 

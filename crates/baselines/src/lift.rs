@@ -62,9 +62,11 @@ pub fn lift(
         projection: seen.camera.projection(),
         focal: seen.camera.intrinsics.fx.max(seen.camera.intrinsics.fy),
     };
-    let rows: Vec<Vec<Texel>> =
-        (0..size).into_par_iter().map(|y| (0..size).map(|x| lifter.texel(x, y)).collect()).collect();
-    let texels = Picture::new(size, size, rows.into_iter().flatten().collect()).expect("a row of texels for every row");
+    // An atlas has up to 16 million texels, of which there must be one copy.
+    let mut texels = Picture::filled(size, size, Texel::Unused);
+    texels.pixels_mut().par_chunks_mut(size).enumerate().for_each(|(y, row)| {
+        row.iter_mut().enumerate().for_each(|(x, texel)| *texel = lifter.texel(x, y));
+    });
     PartialAtlas { atlas, texels }
 }
 

@@ -33,7 +33,7 @@ pub struct Maps {
 impl Maps {
     /// The maps of an atlas, with filled gutters. Maps that are not given have no file.
     pub fn of_atlas(known: &PartialAtlas, given: GivenMaps) -> Self {
-        let mut maps = Self::of_values(&known.texels.map(|texel| texel.seen().unwrap_or(DEFAULT)), given);
+        let mut maps = Self::of_values(&known.texels, |texel| texel.seen().unwrap_or(DEFAULT), given);
         if let Some(map) = &mut maps.base_color {
             known.atlas.fill_gutters(map);
         }
@@ -46,13 +46,27 @@ impl Maps {
     /// Maps with the same values everywhere.
     pub fn constant(values: Values, given: GivenMaps) -> Self {
         let size = *MAP_SIZES.start();
-        Self::of_values(&Picture::filled(size, size, values), given)
+        Self::of_values(&Picture::filled(size, size, values), |values| values, given)
     }
 
-    fn of_values(values: &Picture<Values>, given: GivenMaps) -> Self {
-        let color = || values.map(|[r, g, b, ..]| srgb_bytes([r, g, b]));
-        let scalar =
-            |is_given: bool, channel: usize| is_given.then(|| values.map(|values| byte_from_unit(values[channel])));
+    fn of_values<T: Copy>(texels: &Picture<T>, values: impl Fn(T) -> Values, given: GivenMaps) -> Self {
+        // Texels that are filled from one point are a row of equal colours.
+        let mut last = ([0.0; 3], srgb_bytes([0.0; 3]));
+        let mut bytes = |color: [f32; 3]| {
+            if color != last.0 {
+                last = (color, srgb_bytes(color));
+            }
+            last.1
+        };
+        let color = || {
+            texels.map(|texel| {
+                let [r, g, b, ..] = values(texel);
+                bytes([r, g, b])
+            })
+        };
+        let scalar = |is_given: bool, channel: usize| {
+            is_given.then(|| texels.map(|texel| byte_from_unit(values(texel)[channel])))
+        };
         Self {
             base_color: given.base_color.then(color),
             roughness: scalar(given.roughness, 3),

@@ -77,19 +77,24 @@ impl UvAtlas {
     /// texel has an owner.
     pub fn fill_gutters<T: Copy>(&self, picture: &mut Picture<T>) {
         let size = self.size;
+        let neighbours = |at: usize| {
+            let (x, y) = (at % size, at / size);
+            let all = [
+                (x > 0).then(|| at - 1),
+                (x + 1 < size).then_some(at + 1),
+                (y > 0).then(|| at - size),
+                (y + 1 < size).then_some(at + size),
+            ];
+            all.into_iter().flatten()
+        };
         let mut done: Vec<bool> = self.owners.pixels().iter().map(|owner| *owner != Owner::Nobody).collect();
-        let mut front: Vec<usize> = (0..done.len()).filter(|at| done[*at]).collect();
+        // Of the owned texels only those at the rim of a gutter give their value to a neighbour.
+        let at_rim = |at: &usize| done[*at] && neighbours(*at).any(|neighbour| !done[neighbour]);
+        let mut front: Vec<usize> = (0..done.len()).filter(at_rim).collect();
         while !front.is_empty() {
             let mut next = Vec::new();
             for at in front {
-                let (x, y) = (at % size, at / size);
-                let neighbours = [
-                    (x > 0).then(|| at - 1),
-                    (x + 1 < size).then_some(at + 1),
-                    (y > 0).then(|| at - size),
-                    (y + 1 < size).then_some(at + size),
-                ];
-                for neighbour in neighbours.into_iter().flatten() {
+                for neighbour in neighbours(at) {
                     if std::mem::replace(&mut done[neighbour], true) {
                         continue;
                     }
