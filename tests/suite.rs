@@ -9,6 +9,7 @@
 mod suite {
     mod apart;
     mod arrows;
+    mod attacks;
     mod bad_input;
     mod blender;
     mod blender_import;

@@ -9,6 +9,7 @@ use anyhow::{Context as _, bail};
 use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_files::work_folder;
@@ -16,7 +17,7 @@ use mateval_metrics::{Lpips, Net};
 use mateval_report::leaderboard::marks;
 use mateval_report::pair::{PairValues, compare};
 use mateval_report::release::file::Day;
-use mateval_report::rounded::RoundedFile;
+use mateval_report::rounded::{RoundedFile, check_floor};
 use mateval_submission::SubmissionError;
 use mateval_submission::archive::Opened;
 use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
@@ -141,9 +142,14 @@ pub struct ScoreArgs {
     #[arg(long, requires = "cache")]
     only_cached: bool,
     /// File for the numbers of a hidden split that may be shown: the headline, rounded, with no scene, instance or
-    /// picture; for a single submission.
-    #[arg(long, value_name = "FILE")]
+    /// picture, and only where it is better than every --floor; for a single submission.
+    #[arg(long, value_name = "FILE", requires = "floors")]
     rounded: Option<PathBuf>,
+    /// For --rounded: the result of a baseline that anybody can make from the public files, such as `nn` on `delight`,
+    /// on these scenes or more. Numbers that are not better than its own are shown as its own; may be given several
+    /// times.
+    #[arg(long = "floor", value_name = "RESULT.json", requires = "rounded")]
+    floors: Vec<PathBuf>,
     /// Folder for the pictures from which the numbers are computed, as float EXR, for whoever computes them again with
     /// other tools; with several submissions a folder of it for each, 0 first.
     #[arg(long, value_name = "FOLDER", conflicts_with = "only_cached")]
@@ -170,7 +176,10 @@ impl ScoreArgs {
                 bail!("--rounded takes the numbers of one submission; {} are given", self.submissions.len());
             }
         }
+        let floors = self.floors.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
         let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let scored: Vec<&SceneId> = dataset.chosen_scenes(&self.scenes)?.iter().map(|scene| &scene.id).collect();
+        floors.iter().try_for_each(|floor| check_floor(floor, &dataset, scored.iter().copied()))?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
         let cache = self.cache.clone().unwrap_or_else(|| cache_beside(&self.out));
         if !self.only_cached {
@@ -192,7 +201,9 @@ impl ScoreArgs {
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
         for (result, out) in results.iter().zip(&outs) {
             json::write_lines(out, result)?;
-            self.rounded.iter().try_for_each(|rounded| json::write(rounded, &RoundedFile::new(result)))?;
+            if let Some(rounded) = &self.rounded {
+                json::write(rounded, &RoundedFile::new(result, &floors).context("cannot round the result")?)?;
+            }
             say_findings(&result.method, &result.findings, &out.display().to_string());
             print(&format!("{}\n", out.display()))?;
         }

@@ -29,6 +29,9 @@ pub struct Competition {
     pub dataset: PathBuf,
     /// The private folder of a split whose public folder is `dataset`; absent if `dataset` holds its truth.
     pub private: Option<PathBuf>,
+    /// For a hidden split: results of baselines that anybody can make, on all scenes. Participants see numbers that are
+    /// better than theirs (`eval score --floor`).
+    pub floors: Vec<PathBuf>,
     pub out: PathBuf,
     /// Name and tag of the image on Docker Hub.
     pub image: String,
@@ -95,6 +98,10 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
             if belongs(&file) {
                 copy_file(&root.join(file), &reference.join(file))?;
             }
+        }
+        // They state errors of instances, so they lie with the truth and not with the program, which is public.
+        for (at, floor) in of.floors.iter().enumerate() {
+            copy_file(floor, &reference.join(format!("floor_{at}.json")))?;
         }
         // Truth that is missing, or not that of this dataset, is found here.
         let findings = manifest::check_those(&reference, |file| is_below(file, &slice))?;

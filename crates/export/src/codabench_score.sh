@@ -1,8 +1,8 @@
 #!/bin/sh
 # Scores a submission on Codabench: score.sh rounded|whole [INPUT OUTPUT]
 #
-# In: the dataset with its truth in INPUT/ref, the submission in INPUT/res, the board's columns in columns.txt, the
-# command mateval. Out: OUTPUT/scores.json, a number for each column, and OUTPUT/detailed_results.html, a page that loads
+# In: the dataset with its truth and, of a hidden split, the floors of its numbers in INPUT/ref, the submission in INPUT/res,
+# the board's columns in columns.txt, the command mateval. Out: OUTPUT/scores.json, a number for each column, and OUTPUT/detailed_results.html, a page that loads
 # nothing. Of a hidden split (rounded) neither holds more than `eval score --rounded`, and nothing else is written.
 set -eu
 export LC_ALL=C
@@ -21,7 +21,14 @@ if ! mateval eval lint "$submission" --dataset "$input/ref" > "$work/lint.txt"; 
     echo "the submission was not scored: 'mateval eval lint' finds these errors in it" >&2
     exit 1
 fi
-mateval eval score "$submission" --dataset "$input/ref" --out "$work/whole.json" --rounded "$work/rounded.json" > /dev/null
+set --
+if [ "$numbers" = rounded ]; then
+    set -- --rounded "$work/rounded.json"
+    for floor in "$input"/ref/floor_*.json; do
+        set -- "$@" --floor "$floor"
+    done
+fi
+mateval eval score "$submission" --dataset "$input/ref" --out "$work/whole.json" "$@" > /dev/null
 
 # Both files have a number a line; the means over all scenes follow the word.
 case $numbers in

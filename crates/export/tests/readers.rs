@@ -74,6 +74,7 @@ fn competitions_are_what_codabench_documents() {
         let competition = Competition {
             dataset: sample_dataset::dataset().root.clone(),
             private: None,
+            floors: Vec::new(),
             out: folder.path().join("out"),
             image: "example/mateval:1".to_owned(),
             columns: ["albedo.novel.psnr", "rgb_true.novel.psnr"].map(column).to_vec(),

@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::DatasetVersion;
+use mateval_dataset::open::Dataset;
 use mateval_dataset::{DatasetError, Finding, SceneId, Severity};
 use mateval_eval::EvalError;
 use mateval_eval::protocol::SCORER_VERSION;
@@ -162,6 +163,10 @@ pub enum Mismatch {
         expected, path.display(), found
     )]
     Dataset { expected: DatasetVersion, path: PathBuf, found: DatasetVersion },
+    #[error(
+        "the floor '{method}' lacks {missing} of the scenes that are scored, '{first}' first; score it on all of them"
+    )]
+    FloorScenes { method: String, missing: usize, first: SceneId },
     #[error("scene '{scene}' was not scored; choose one of: {}", ids(scored))]
     SceneNotScored { scene: SceneId, scored: Vec<SceneId> },
     /// One hash covers all files of a submission, so that it does not show which file differs.
@@ -226,6 +231,13 @@ impl fmt::Display for SubmissionVersion {
 }
 
 impl Mismatch {
+    /// The reason for which a result is not about a dataset, if it is about another one.
+    pub(crate) fn of_dataset(result: &ResultFile, dataset: &Dataset) -> Option<Self> {
+        let (expected, found) = (result.dataset.named(), dataset.file.named());
+        let is_other = expected.manifest_sha256 != found.manifest_sha256;
+        is_other.then(|| Self::Dataset { expected, path: dataset.root.clone(), found })
+    }
+
     /// The reason for which a result has no scores under a protocol, if it has none.
     pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
         let method = shown_method(result);

@@ -8,6 +8,7 @@ use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{Finding, SceneId, Severity, ViewId};
 use mateval_eval::metric::Better;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
 use mateval_export::codabench::{self, Column, Competition};
 use mateval_export::mitsuba::export_view;
@@ -17,6 +18,7 @@ use mateval_prep::recipe::{self, RECIPE};
 use mateval_report::publish::{Published, publish};
 use mateval_report::release::file::Day;
 use mateval_report::release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
+use mateval_report::rounded::check_floor;
 
 use crate::TOOL;
 use crate::prep::make::samples_parser;
@@ -239,6 +241,10 @@ struct CompetitionArgs {
     /// For codabench: the private folder of the split whose public folder the dataset is.
     #[arg(long, requires = "image")]
     private: Option<PathBuf>,
+    /// For codabench: the result of a baseline that anybody can make from the public files, such as `nn` on `delight`.
+    /// Of a hidden split participants see only numbers that are better; may be given several times.
+    #[arg(long = "floor", value_name = "RESULT.json", requires = "image")]
+    floors: Vec<PathBuf>,
     /// For codabench: how long a scene takes to score, in seconds, so that the scenes are cut into tasks that keep to
     /// --limit [default: one task].
     #[arg(long, requires = "image", value_parser = clap::value_parser!(u32).range(1..))]
@@ -317,6 +323,15 @@ impl ExportArgs {
         if self.competition.private.is_none() && dataset.scenes.iter().any(is_without_truth) {
             bail!("'{}' has no ground truth, which scores need; give --private FOLDER", self.dataset.display());
         }
+        if dataset.is_hidden() && self.competition.floors.is_empty() {
+            bail!(
+                "the rounded numbers of a hidden split begin at those of a public baseline; give its result by --floor \
+                 RESULT.json"
+            );
+        }
+        for path in &self.competition.floors {
+            check_floor(&ResultFile::read(path)?, &dataset, &dataset.file.scenes)?;
+        }
         let protocol = Protocol::named("mateval-3")?;
         let column = |key: &ResultKey| {
             let style = &key.metric.row().style;
@@ -329,6 +344,7 @@ impl ExportArgs {
         let competition = Competition {
             dataset: self.dataset.clone(),
             private: self.competition.private.clone(),
+            floors: self.competition.floors.clone(),
             out: self.out.clone(),
             image: self.competition.image.clone().unwrap_or_default(),
             columns: protocol.headline.iter().map(column).collect(),

@@ -208,9 +208,7 @@ fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, ReportError> 
     if scores.protocol.scorer_version != SCORER_VERSION {
         mismatches.push(Mismatch::Scorer { found: scores.protocol.scorer_version });
     }
-    if result.dataset.manifest_sha256 != dataset.file.manifest_sha256 {
-        mismatches.push(other_dataset(plan));
-    }
+    mismatches.extend(Mismatch::of_dataset(result, dataset));
     if !result.dataset.scenes.contains(plan.scene) {
         let scored = result.dataset.scenes.clone();
         mismatches.push(Mismatch::SceneNotScored { scene: plan.scene.clone(), scored });
@@ -219,14 +217,6 @@ fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, ReportError> 
         mismatches.extend(other_submission(plan)?);
     }
     ReportError::refuse(mismatches).map(|()| scores)
-}
-
-fn other_dataset(plan: &ExplainPlan<'_>) -> Mismatch {
-    Mismatch::Dataset {
-        expected: plan.result.dataset.named(),
-        path: plan.dataset.root.clone(),
-        found: plan.dataset.file.named(),
-    }
 }
 
 /// A mismatch if the submission does not have the hash that the result states.

@@ -1,0 +1,231 @@
+//! What somebody reaches on a redressed split who has the public files and the undressed source: by remembering textures, and
+//! by submissions whose shown numbers solve for the truth.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{LazyLock, Mutex};
+
+use glam::DVec2;
+use mateval_dataset::uv_atlas::UvAtlas;
+use mateval_dataset::{TriangleMesh, glb};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::{LinearRgb, Picture, Wrap, png_io};
+use mateval_testkit::{copy_folder, kept_folder};
+use serde_json::Value;
+
+use super::command::{baseline, build, mateval, run, run_words};
+use super::sample::{files_below, json};
+
+/// A room as its source shows it (`undressed`), redressed (`redressed`), and the public part of that (`public`), each with a
+/// photo; and the first two without one (`undressed_scored`, `redressed_scored`), since nothing is rendered where these are
+/// scored. Submissions are written beside them.
+struct Rooms {
+    folder: PathBuf,
+    /// Held while a shared submission is written.
+    writing: Mutex<()>,
+}
+
+impl Rooms {
+    /// `scene` is the recipe's entry, whose paths are relative to `source`.
+    fn new(name: &str, source: &Path, scene: &str) -> Self {
+        let folder = kept_folder(name);
+        std::fs::write(folder.join("key"), [5; 32]).unwrap();
+        for (dataset, redress) in [("undressed", ""), ("redressed", "redress = { key = \"KEY\" }")] {
+            let recipe = folder.join(format!("{dataset}.toml"));
+            let redress = redress.replace("KEY", folder.join("key").to_str().unwrap());
+            let head = "name = \"attacked\"\nresolution = [96, 72]\natlas_size = 128";
+            std::fs::write(&recipe, format!("{head}\n[[scene]]\nid = \"room\"\n{scene}\n{redress}\n")).unwrap();
+            run(build(&recipe, &folder.join(dataset)).arg("--source").arg(source)).ends_with(0);
+            copy_folder(&folder.join(dataset), &folder.join(format!("{dataset}_scored")));
+            let mut render = mateval();
+            run(render.args(["prep", "render", "--only", "photo", "--samples", "64"]).arg(folder.join(dataset)))
+                .ends_with(0);
+        }
+        let mut publish = mateval();
+        publish.args(["prep", "publish", "--withhold", "ground_truth", "--public"]).arg(folder.join("public"));
+        run(publish.arg("--private").arg(folder.join("private")).arg(folder.join("redressed"))).ends_with(0);
+        Self { folder, writing: Mutex::new(()) }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Writes the submission of a baseline on the photo, made from the public files of a dataset.
+    fn honest(&self, name: &str, dataset: &str, estimate: &str) -> PathBuf {
+        let out = self.path(&format!("{name}_{dataset}_{estimate}"));
+        let _writing = self.writing.lock().unwrap();
+        if !out.exists() {
+            run(baseline(name, &self.path(dataset), &out).args(["--estimate", estimate])).ends_with(0);
+        }
+        out
+    }
+
+    /// The PSNR of albedo in the novel views, in dB.
+    fn psnr(&self, submission: &Path, dataset: &str) -> f64 {
+        let result = tempfile::tempdir().unwrap();
+        let path = result.path().join("result.json");
+        run(&mut score(submission, &self.path(dataset), &path)).ends_with(0);
+        psnr(&json(&path))
+    }
+}
+
+fn psnr(result: &Value) -> f64 {
+    result["protocols"]["mateval-3"]["summary"]["albedo.novel.psnr"].as_f64().unwrap()
+}
+
+/// Scores the maps of a submission.
+fn score(submission: &Path, dataset: &Path, result: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["eval", "score"]).arg(submission).arg("--dataset").arg(dataset).arg("--out").arg(result);
+    command
+}
+
+static SAMPLE: LazyLock<Rooms> = LazyLock::new(|| {
+    let source = kept_folder("attacked_source").join("source");
+    run_words([Path::new("sample"), &source]).ends_with(0);
+    Rooms::new("attacked", &source, "bitterli = \"room/scene.xml\"")
+});
+
+/// The undressed base colours of every instance of a dataset whose shape is known, on the atlas that it has there.
+/// Shapes are the same if their triangles are, up to their place in the room; atlases differ between datasets.
+fn undressed_atlases(rooms: &Rooms, dataset: &str) -> BTreeMap<String, Picture<LinearRgb>> {
+    let nodes = |dataset: &str| glb::read(&rooms.path(dataset).join("scenes/room/geometry/instances.glb")).unwrap();
+    let (known, mut found) = (nodes("undressed"), BTreeMap::new());
+    for node in nodes(dataset) {
+        let Some(shape) = known.iter().find(|other| shape(&other.mesh) == shape(&node.mesh)) else { continue };
+        let file = format!("undressed/scenes/room/ground_truth/materials/{}/base_color.png", shape.name);
+        if !rooms.path(&file).is_file() {
+            continue;
+        }
+        let texture = read_texture(&rooms.path(&file), Encoding::Srgb, Wrap::Clamp).unwrap();
+        let (size, uvs) = (texture.width(), shape.mesh.uvs.as_ref().unwrap());
+        let atlas = UvAtlas::new(&node.mesh, size);
+        let color = |x: usize, y: usize| {
+            let Some((triangle, _)) = atlas.owner(x, y) else { return LinearRgb::default() };
+            let weights = atlas.nearest_barycentrics(triangle, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).as_vec3();
+            let corners = shape.mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
+            let uv = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+            LinearRgb(texture.sample(uv.to_array()))
+        };
+        let mut picture = Picture::from_fn(size, size, color);
+        atlas.fill_gutters(&mut picture);
+        found.insert(node.name, picture);
+    }
+    assert!(found.len() > 5, "{}", found.len());
+    found
+}
+
+/// What a shape is known by: the corners of its triangles from the first one on, in millimetres.
+fn shape(mesh: &TriangleMesh) -> Vec<[[i32; 3]; 3]> {
+    let first = mesh.corners(0)[0];
+    let corners =
+        |triangle| mesh.corners(triangle).map(|place| ((place - first) * 1000.0).round().as_ivec3().to_array());
+    (0..mesh.triangles.len()).map(corners).collect()
+}
+
+/// Writes base colours over those of another submission.
+fn write_colors(submission: &Path, instance: &str, colors: &Picture<LinearRgb>) {
+    let bytes = colors.map(|LinearRgb(rgb)| rgb.map(|value| byte_from_unit(srgb_from_linear(value.clamp(0.0, 1.0)))));
+    png_io::write_rgb_bytes(&submission.join("scenes/room").join(instance).join("base_color.png"), &bytes).unwrap();
+}
+
+/// The submission of somebody who knows textures by shape; what is not known has the medians of the photo.
+fn remembered(rooms: &Rooms, dataset: &str) -> PathBuf {
+    let out = rooms.path(&format!("remembered_{dataset}"));
+    copy_folder(&rooms.honest("median", dataset, "delight"), &out);
+    undressed_atlases(rooms, dataset).iter().for_each(|(instance, colors)| write_colors(&out, instance, colors));
+    out
+}
+
+/// A method that remembers textures is first in the undressed room and below the medians of the photo in the redressed
+/// one. A method that looks at the photo stays where it was, but for less than a third of that fall.
+#[test]
+fn remembered_textures_fall_below_the_medians() {
+    let rooms = &*SAMPLE;
+    let psnr = |made: &str, scored: &str| {
+        let nn = rooms.psnr(&rooms.honest("nn", made, "delight"), scored);
+        let median = rooms.psnr(&rooms.honest("median", made, "delight"), scored);
+        (rooms.psnr(&remembered(rooms, made), scored), nn, median)
+    };
+    let (undressed, redressed) = (psnr("undressed", "undressed_scored"), psnr("public", "redressed_scored"));
+    let all = format!("memory, nn, median: {undressed:?} undressed, {redressed:?} redressed");
+    assert!(undressed.0 > undressed.1.max(undressed.2) && redressed.0 < redressed.2, "{all}");
+    assert!((undressed.1 - redressed.1).abs() < (undressed.0 - redressed.0) / 3.0, "{all}");
+}
+
+/// Constant submissions: black, red, green and blue.
+const CONSTANTS: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// The mean colour that four errors of constants follow from: the mean of (t - 1)^2 over a channel and of t^2 over the
+/// others is that of black plus (1 - 2 mean) / 3.
+fn solved([black, red, green, blue]: [f64; 4]) -> [f32; 3] {
+    [red, green, blue].map(|mse| ((1.0 - 3.0 * (mse - black)) / 2.0).clamp(0.0, 1.0) as f32)
+}
+
+/// Fault 3: the results of black and of three colours solve for the mean colour of every instance. Rounded ones do not
+/// tell the four apart, and no constant is better than the floor.
+#[test]
+fn shown_results_are_no_oracle() {
+    let rooms = &*SAMPLE;
+    let out = tempfile::tempdir().unwrap();
+    let [submission, result, rounded, floor] =
+        ["constant", "result.json", "rounded.json", "floor.json"].map(|name| out.path().join(name));
+    let whole = rooms.path("redressed_scored");
+    run(&mut score(&rooms.honest("nn", "public", "delight"), &whole, &floor)).ends_with(0);
+    run(&mut baseline("grey", &rooms.path("public"), &submission)).ends_with(0);
+    let maps: Vec<PathBuf> =
+        files_below(&submission).into_iter().filter(|file| file.ends_with("base_color.png")).collect();
+    // The whole and the rounded result of a colour for each instance.
+    let scored = |color: &dyn Fn(&str) -> [f32; 3]| {
+        for map in &maps {
+            let instance = map.parent().and_then(Path::file_name).unwrap().to_str().unwrap();
+            let bytes = color(instance).map(|value| (255.0 * srgb_from_linear(value)).round() as u8);
+            png_io::write_rgb_bytes(&submission.join(map), &Picture::filled(64, 64, bytes)).unwrap();
+        }
+        let mut command = score(&submission, &whole, &result);
+        run(command.arg("--force").arg("--rounded").arg(&rounded).arg("--floor").arg(&floor)).ends_with(0);
+        (json(&result), json(&rounded))
+    };
+    let mse = |psnr: f64| 10_f64.powf(-psnr / 10.0);
+    let constants = CONSTANTS.map(|color| scored(&|_| color));
+
+    // Whole results: first of the mean colour of the split, then of each instance.
+    let best_constant = scored(&|_| solved(constants.each_ref().map(|(whole, _)| mse(psnr(whole)))));
+    let errors = constants.each_ref().map(|(whole, _)| {
+        let all = whole["protocols"]["mateval-3"]["instances"].as_array().unwrap().iter();
+        let albedo = all.filter(|one| one["picture"] == "albedo" && one["views"] == "novel");
+        albedo.map(|one| (one["instance"].as_str().unwrap().to_owned(), one["mse"].as_f64().unwrap())).collect()
+    });
+    let of_instance = |name: &str| {
+        let errors: [Option<f64>; 4] = errors.each_ref().map(|all: &BTreeMap<String, f64>| all.get(name).copied());
+        solved(errors.map(|error| error.unwrap_or(0.0)))
+    };
+    let oracle = psnr(&scored(&of_instance).0);
+
+    // Rounded ones.
+    let shown = |file: &Value| (file["headline"].clone(), file["at_floor"].clone());
+    for (_, file) in &constants {
+        assert!(!file.to_string().contains("instances") && file["floors"].as_array().unwrap().len() == 1, "{file}");
+        assert_eq!(shown(file), shown(&constants[0].1));
+    }
+    let headline = &best_constant.1["headline"]["mateval-3"];
+    let at_floor = best_constant.1["at_floor"]["mateval-3"].as_array().unwrap();
+    assert!(at_floor.contains(&"albedo.novel.psnr".into()), "{}", best_constant.1);
+    let guess = scored(&|_| solved([mse(headline["albedo.novel.psnr"].as_f64().unwrap()); 4])).0;
+    let median = rooms.psnr(&rooms.honest("median", "public", "delight"), "redressed_scored");
+    let honest = psnr(&json(&floor));
+    let all = format!(
+        "oracle of instances {oracle}, best constant {}, constant of the shown numbers {}, median {median}, nn {honest}",
+        psnr(&best_constant.0),
+        psnr(&guess)
+    );
+    assert!(psnr(&guess) < median && psnr(&best_constant.0) < honest && oracle > honest + 3.0, "{all}");
+
+    // A board is made from whole results, and no number is shown without a floor.
+    let board = run(mateval().args(["eval", "leaderboard"]).arg(&rounded).arg("--out").arg(out.path().join("site")));
+    board.ends_with(2).says("mateval-rounded/1");
+    run(score(&submission, &whole, &result).arg("--force").arg("--rounded").arg(&rounded)).ends_with(2).says("--floor");
+}
