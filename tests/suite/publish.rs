@@ -267,6 +267,26 @@ fn what_follows_from_public_files_is_not_called_secret() {
         .says("not be withheld");
 }
 
+/// A recipe states that nobody else has the files. Its twin is the public room of the test before.
+#[test]
+fn a_private_source_is_a_secret() {
+    let out = tempfile::tempdir().unwrap();
+    let [source, dataset] = ["source", "dataset"].map(|name| out.path().join(name));
+    run_words([Path::new("sample"), &source]).ends_with(0);
+    let recipe = source.join("private.toml");
+    std::fs::write(&recipe, recipe_text(SMALL, &["room"]) + "source = \"private\"\n").unwrap();
+    run(&mut build(&recipe, &dataset)).ends_with(0);
+    let mut tar = mateval();
+    tar.args(["prep", "export", "--as", "tar", "--out"]).arg(out.path().join("tar")).arg(&dataset);
+    run(&mut tar).ends_with(2).says("--with-ground-truth");
+    publish(&dataset, out.path(), &[]).ends_with(0);
+    let public = out.path().join("public");
+    assert_eq!(json(&public.join("dataset.json"))["withheld"], "secret");
+    let scene = json(&public.join("scenes/room/scene.json"));
+    assert_eq!((&scene["source"]["private"], &scene["source"]["files"]), (&true.into(), &serde_json::json!([])));
+    assert_eq!(json(&super::sample::unrendered().join("scenes/room/scene.json"))["source"].get("private"), None);
+}
+
 #[test]
 fn a_changed_dataset_is_not_published() {
     let (out, changed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());

@@ -48,7 +48,7 @@ fn recipe(folder: &Path, redress: &str) -> PathBuf {
     let room = "house = \"house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json\", room = \"LivingDiningRoom-101\", \
                 models = \"house/3D-FUTURE-model\", textures = \"house/3D-FRONT-texture\", appearance = \"stated\"";
     let text = format!(
-        "name = \"redress\"\nresolution = [64, 48]\natlas_size = 128\nviews = []\n\
+        "name = \"redress\"\nresolution = [64, 48]\natlas_size = 128\nviews = []\nlicences = {{ front3d = \"CC0-1.0\" }}\n\
          [[scene]]\nid = \"living\"\nfront3d = {{ {room} }}\ncamera = {{ designer = 0 }}\n{redress}\n\
          [[scene]]\nid = \"room\"\nbitterli = \"room/scene.xml\"\n{redress}\n"
     );
@@ -151,6 +151,15 @@ fn lights_and_glass_stay_and_textures_go() {
             "{names:?}"
         );
     }
+}
+
+/// The recipe's for a room of a house, the file beside it for the other scene.
+#[test]
+fn every_source_has_its_licence() {
+    let licences = json(&BUILT.join("first/dataset.json"))["licences"].clone();
+    let of = |at: usize| (licences[at]["scene"].clone(), licences[at]["file"].clone());
+    assert_eq!((of(0), &licences[0]["text"]), (("living".into(), "recipe.toml".into()), &"CC0-1.0".into()));
+    assert_eq!((of(1), licences[2].clone()), (("room".into(), "LICENSE.txt".into()), Value::Null));
 }
 
 #[test]

@@ -106,9 +106,9 @@ impl Dataset {
         self.file.photo_renderer.as_ref().filter(|_| scene.photo.is_none())
     }
 
-    /// Whether its ground truth is withheld, or meant to be: it is a hidden split, or has redressed scenes.
+    /// Whether its ground truth is withheld, or meant to be: it is a hidden split, or has scenes whose truth is a secret.
     pub fn is_hidden(&self) -> bool {
-        self.file.withheld.is_some() || self.scenes.iter().any(|scene| scene.redressed.is_some())
+        self.file.withheld.is_some() || self.scenes.iter().any(SceneFile::is_secret)
     }
 
     /// Fails where the dataset holds a ground truth that is meant to be secret, unless `with_ground_truth`: for work
@@ -119,6 +119,21 @@ impl Dataset {
             return Ok(());
         }
         Err(DatasetError::SecretTruth { path: self.root.clone() })
+    }
+
+    /// A sentence on the scenes for which no licence is stated; none if every scene has one.
+    pub fn unstated_licences(&self) -> Option<String> {
+        let without = self.file.without_licence();
+        let first = without.first()?;
+        let of = self.file.scenes.len();
+        let mut text = format!("no licence is stated for {} of the {of} scenes, '{first}' first", without.len());
+        let is_room = |scene: &SceneFile| scene.source.kind == SourceKind::Front3d && without.contains(&scene.id);
+        if self.scenes.iter().any(is_room) {
+            text += "; data of 3D-FRONT and 3D-FUTURE come under the 3D-FRONT Data Sets Use License Agreement \
+                     (https://gw.alicdn.com/bao/uploaded/TB1ZJUfK.z1gK0jSZLeXXb9kVXa.pdf), which is for scientific research \
+                     and can be neither transferred nor sublicensed";
+        }
+        Some(text)
     }
 
     pub fn folder(&self, scene: &SceneId) -> SceneFolder {

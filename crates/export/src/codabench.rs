@@ -16,7 +16,7 @@ use mateval_dataset::{DatasetError, Progress, Report, SceneId, manifest};
 use mateval_files::work_folder::WorkFolder;
 use serde_json::Value;
 
-use crate::dataset::{ExportError, Format, SoundDataset, copy_file, inert, licence_text, shown_views, write_file};
+use crate::dataset::{ExportError, Format, SoundDataset, copy_file, inert, shown_views, write_file};
 
 const SCORE: &str = include_str!("codabench_score.sh");
 const PROTOCOL: &str = include_str!("../../../dataset_spec/PROTOCOL.md");
@@ -220,16 +220,10 @@ fn overview(of: &Competition, dataset: &Dataset) -> String {
 
 /// The rules, and each licence once.
 fn terms(dataset: &Dataset) -> String {
-    let mut licences: Vec<String> =
-        dataset.scenes.iter().filter_map(|scene| licence_text(dataset, &scene.id)).collect();
-    licences.sort();
-    licences.dedup();
-    let texts: String =
-        licences.iter().map(|text| format!("\n```text\n{}\n```\n", text.replace("```", "'''"))).collect();
-    match texts.is_empty() {
-        true => format!("{RULES}\nThe dataset states no licence; ask the organisers.\n"),
-        false => format!("{RULES}{texts}"),
-    }
+    let texts = dataset.file.shared_licences().into_iter().map(|licence| licence.text);
+    let shown = |text: String| format!("\n```text\n{}\n```\n", text.trim_end().replace("```", "'''"));
+    let unstated = dataset.unstated_licences().map(|text| format!("\nAsk the organisers: {text}.\n"));
+    format!("{RULES}{}{}", texts.map(shown).collect::<String>(), unstated.unwrap_or_default())
 }
 
 /// The text with the words of its links to files in place of the links.

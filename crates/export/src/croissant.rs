@@ -138,12 +138,10 @@ const DESCRIPTION: &str = "Indoor scenes for recovering materials from one photo
      along their -Z, +Y is up, lengths are metres. base.tar and any of the scenes' tars, unpacked in one folder, are a \
      dataset that MatEval opens.";
 
-/// The texts of the scenes' licences, each once.
+/// The texts of the scenes' licences, each once, and what is to be said of scenes without one.
 fn licence_list(sound: &SoundDataset) -> Value {
-    let mut texts: Vec<&str> = sound.dataset.file.licences.iter().map(|licence| licence.text.as_str()).collect();
-    texts.sort_unstable();
-    texts.dedup();
-    if texts.is_empty() { json!("no licence is stated in the dataset") } else { json!(texts) }
+    let texts = sound.dataset.file.shared_licences().into_iter().map(|licence| licence.text);
+    json!(texts.chain(sound.dataset.unstated_licences()).collect::<Vec<_>>())
 }
 
 fn file_object(name: &str, place: &str, sha256: &str, facts: Value) -> Value {

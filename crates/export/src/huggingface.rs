@@ -10,7 +10,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_dataset::{Camera, Progress, Report};
+use mateval_dataset::{Camera, Progress, Report, SceneId};
 use mateval_files::FileError;
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int32Type};
@@ -116,6 +116,15 @@ fn card(sound: &SoundDataset, exported: &Exported) -> String {
         let _ = writeln!(text, "{} views have no `picture`, because theirs is withheld.\n", exported.without_picture);
     }
     text.push_str(COLUMNS);
+    text.push_str("\n## Licences\n\n");
+    for licence in file.shared_licences() {
+        let scenes: Vec<&str> = licence.scenes.iter().map(SceneId::as_str).collect();
+        let first = licence.text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+        let _ = writeln!(text, "- {} ({}): {}", inert(&licence.file), scenes.join(", "), inert(first.trim()));
+    }
+    if let Some(unstated) = sound.dataset.unstated_licences() {
+        let _ = writeln!(text, "- {unstated}");
+    }
     text
 }
 

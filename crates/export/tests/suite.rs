@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DQuat, DVec2, DVec3};
-use mateval_dataset::dataset::DatasetFile;
+use mateval_dataset::dataset::{DatasetFile, Licence};
 use mateval_dataset::manifest;
 use mateval_dataset::open::DatasetId;
 use mateval_dataset::open::{Dataset, chosen_ids};
@@ -358,17 +358,39 @@ fn every_export_holds_the_licences() {
         assert_eq!(text, format!("LICENSE.txt:\n\n{}\n", licence.text.trim_end()));
         assert!(!out.join(other).exists());
         // Beside the file, descriptions of views state it too.
-        let start = licence.text.lines().next().unwrap().as_bytes();
+        let start = "This is the Mitsuba version of 'The Sample Room'";
+        assert!(licence.text.starts_with(start));
         let stating = match format {
             Format::Croissant => vec!["croissant.json", "views.jsonl"],
-            Format::Huggingface => vec!["data/test-00000-of-00001.parquet"],
+            Format::Huggingface => vec!["README.md", "data/test-00000-of-00001.parquet"],
             _ => Vec::new(),
         };
         let all = files(&out);
-        for name in stating {
+        let holds = |name: &str, text: &str| {
             let (_, bytes) = all.iter().find(|(file, _)| file == name).unwrap();
-            assert!(bytes.windows(start.len()).any(|window| window == start), "{name}");
+            bytes.windows(text.len()).any(|window| window == text.as_bytes())
+        };
+        for name in stating {
+            assert!(holds(name, start), "{name}");
+            // Those of the whole dataset say what the other scene lacks.
+            let is_whole = ["croissant.json", "README.md"].contains(&name);
+            assert_eq!(holds(name, "for 1 of the 2 scenes, 'living' first; data of 3D-FRONT"), is_whole, "{name}");
         }
+    }
+}
+
+/// The twin: the recipe states the licence that the source lacks.
+#[test]
+fn nothing_is_said_where_every_scene_has_a_licence() {
+    let copy = copy();
+    let path = copy.path().join("dataset.json");
+    let mut file: DatasetFile = json::read(&path).unwrap();
+    file.licences.push(Licence { scene: id("living"), file: "recipe.toml".to_owned(), text: "CC0-1.0".to_owned() });
+    json::write(&path, &file).unwrap();
+    for (format, name) in [(Format::Croissant, "croissant.json"), (Format::Huggingface, "README.md")] {
+        let (folder, _) = exported(copy.path(), format);
+        let text = std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+        assert!(text.contains("CC0-1.0") && !text.contains("no licence is stated"), "{text}");
     }
 }
 

@@ -55,8 +55,9 @@ pub enum ReportError {
     /// The truth of scenes can be made again from public files, however it is packed.
     #[error(
         "'{}' cannot be kept secret: {} of its scenes {}, have the materials of their source, so that anybody who has \
-         the source can make the truth again; redress them (`redress` in the recipe), or add --open-book to withhold \
-         the truth without claiming that it is secret",
+         the source can make the truth again; redress them (`redress` in the recipe), state `source = \"private\"` in \
+         the recipe for sources that nobody else has, or add --open-book to withhold the truth without claiming that it \
+         is secret",
         path.display(), scenes.len(), named(scenes)
     )]
     OpenBook { path: PathBuf, scenes: Vec<SceneId> },

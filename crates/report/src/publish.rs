@@ -38,7 +38,7 @@ pub struct Published {
 
 /// The scenes whose truth follows from public files.
 pub fn open_scenes(dataset: &Dataset) -> Vec<SceneId> {
-    dataset.scenes.iter().filter(|scene| scene.redressed.is_none()).map(|scene| scene.id.clone()).collect()
+    dataset.scenes.iter().filter(|scene| !scene.is_secret()).map(|scene| scene.id.clone()).collect()
 }
 
 /// Writes the public files of the dataset in `root` to `public` and the others to `private`; both are replaced where

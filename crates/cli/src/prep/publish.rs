@@ -286,9 +286,9 @@ impl ExportArgs {
             (FormatName::Nerfstudio, None) => Format::Nerfstudio,
             (FormatName::Colmap, None) => Format::Colmap,
         };
-        Dataset::open(&self.dataset)
-            .and_then(|dataset| dataset.check_may_be_shown(self.with_ground_truth))
-            .context("cannot export the dataset")?;
+        let dataset = Dataset::open(&self.dataset).context("cannot export the dataset")?;
+        dataset.check_may_be_shown(self.with_ground_truth).context("cannot export the dataset")?;
+        warn_without_licence(&dataset);
         let options = ExportOptions {
             dataset: self.dataset.clone(),
             format,
@@ -319,6 +319,7 @@ impl ExportArgs {
     fn run_codabench(&self) -> anyhow::Result<Outcome> {
         let dataset = Dataset::open(&self.dataset)?;
         dataset.check_may_be_shown(self.with_ground_truth)?;
+        warn_without_licence(&dataset);
         let is_without_truth = |scene: &SceneFile| !dataset.folder(&scene.id).truth().is_dir();
         if self.competition.private.is_none() && dataset.scenes.iter().any(is_without_truth) {
             bail!("'{}' has no ground truth, which scores need; give --private FOLDER", self.dataset.display());
@@ -382,10 +383,18 @@ impl ExportArgs {
         check_outside_datasets(&self.out, "--out")?;
         let dataset = Dataset::open(&self.dataset)?;
         dataset.check_may_be_shown(self.with_ground_truth)?;
+        warn_without_licence(&dataset);
         let samples = match self.samples {
             Some(samples) => samples,
             None => recipe::read(&self.dataset.join(RECIPE))?.0.samples,
         };
         Ok(export_view(&dataset, scene, &self.view, samples, &self.out)?)
+    }
+}
+
+/// Whoever gets the dataset cannot know what it may be used for.
+fn warn_without_licence(dataset: &Dataset) {
+    if let Some(unstated) = dataset.unstated_licences() {
+        say(&format!("warning: {unstated}; state it in the recipe, by `licences`, and run `mateval prep build` again"));
     }
 }

@@ -2,6 +2,7 @@
 //! its scenes, the roles of their instances, and how perturbed geometry differs from the true one.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -74,6 +75,26 @@ impl DatasetFile {
         self.geometry.as_ref().map_or(&self.manifest_sha256, |geometry| &geometry.true_manifest_sha256)
     }
 
+    /// Every licence text once, in the order of the first scene of each.
+    pub fn shared_licences(&self) -> Vec<SharedLicence> {
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut all: Vec<SharedLicence> = Vec::new();
+        for licence in &self.licences {
+            let at = *places.entry(&licence.text).or_insert(all.len());
+            if at == all.len() {
+                all.push(SharedLicence { file: licence.file.clone(), text: licence.text.clone(), scenes: Vec::new() });
+            }
+            all[at].scenes.push(licence.scene.clone());
+        }
+        all
+    }
+
+    /// The scenes for which no licence is stated.
+    pub fn without_licence(&self) -> Vec<SceneId> {
+        let has = |id: &SceneId| self.licences.iter().any(|licence| licence.scene == *id);
+        self.scenes.iter().filter(|id| !has(id)).cloned().collect()
+    }
+
     pub fn perturbation(&self) -> Option<Perturbation> {
         self.geometry.as_ref().map(|geometry| geometry.perturbation)
     }
@@ -103,13 +124,25 @@ impl fmt::Display for DatasetVersion {
     }
 }
 
-/// A scene's licence text, as it came with its source.
+/// A licence text and the scenes that it is about.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SharedLicence {
+    /// Its file, relative to the source of the first of these scenes, or `recipe.toml`.
+    pub file: String,
+    /// The whole text.
+    pub text: String,
+    /// The scenes, in the dataset's order.
+    pub scenes: Vec<SceneId>,
+}
+
+/// A scene's licence text, as it came with its source or as the recipe states it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Licence {
     /// The scene that it holds for.
     pub scene: SceneId,
-    /// The file that it came from, relative to the source.
+    /// The file that it came from, relative to the source, or `recipe.toml`.
     pub file: String,
     /// The whole text.
     pub text: String,
@@ -178,6 +211,10 @@ pub struct SceneSource {
     pub kind: SourceKind,
     /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
     pub house: String,
+    /// Whether the recipe states that the source's files are not public, so that the truth does not follow from public
+    /// ones.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub private: bool,
     /// Whether the source states the roughness of its materials. Otherwise that of the truth is a constant of the
     /// reader, and predictions of roughness are not scored.
     pub states_roughness: bool,
@@ -385,6 +422,11 @@ impl SceneFile {
     pub fn all_part_sets(&self) -> impl Iterator<Item = (Option<&PartSetId>, &[Part])> {
         let others = self.part_sets.iter().map(|set| (Some(&set.id), set.parts.as_slice()));
         std::iter::once((None, self.parts.as_slice())).chain(others)
+    }
+
+    /// Whether its truth is meant to be a secret: it was redressed, or its source is private.
+    pub fn is_secret(&self) -> bool {
+        self.redressed.is_some() || self.source.private
     }
 
     pub fn view(&self, id: &str) -> Option<&View> {

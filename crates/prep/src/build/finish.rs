@@ -90,6 +90,7 @@ fn finish_with(
     };
     for id in &dataset.scenes {
         dataset.licences.extend(json::read::<SceneMark>(&build.mark(id))?.licence);
+        dataset.licences.extend(recipe.licence_of(id));
     }
     let known = scene_hashes(root, &mut dataset, cut_off, progress)?;
     json::write(&root.join(TARGETS), &targets(root, &dataset)?)?;

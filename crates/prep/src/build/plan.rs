@@ -21,7 +21,7 @@ use super::source::views_of;
 use super::wide_views::wide_views;
 use crate::conversion::convert;
 use crate::error::PrepError;
-use crate::recipe::{Recipe, RecipeScene};
+use crate::recipe::{Availability, Recipe, RecipeScene};
 
 /// A scene with numbered instances and parts and with the cameras of all views.
 pub(super) struct Plan {
@@ -99,6 +99,7 @@ pub(super) fn make_plan(
     let source = SceneSource {
         kind,
         house: entry.house.clone().unwrap_or(house),
+        private: entry.availability == Availability::Private,
         states_roughness,
         states_metallic,
         shift_m: read.shift_m.to_array(),

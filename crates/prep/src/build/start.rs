@@ -319,6 +319,7 @@ pub(crate) fn settings_sha256(recipe: &Recipe, id: &SceneId, tool: &str) -> Stri
         materials,
         camera_rules,
         samples: _,
+        licences: _,
         scenes,
     } = recipe;
     let entry = scenes.iter().find(|entry| entry.id == *id);

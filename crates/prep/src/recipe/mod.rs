@@ -5,12 +5,12 @@
 pub mod fault;
 mod scene;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use mateval_dataset::ViewId;
-use mateval_dataset::dataset::TrueMaterials;
+use mateval_dataset::dataset::{Licence, TrueMaterials};
+use mateval_dataset::{SceneId, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::untrusted::{hint, mistaken_for, read_at_most, without_mark};
 use mateval_sources::front3d::camera_rules::CameraRules;
@@ -20,7 +20,9 @@ use crate::error::PrepError;
 pub(crate) use fault::RESOLUTION;
 use fault::{RecipeFault, ValueFault, check_sizes};
 pub(crate) use scene::SourcePath;
-pub use scene::{AppearanceWord, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource, Redress};
+pub use scene::{
+    AppearanceWord, Availability, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource, Redress,
+};
 
 /// The name of the recipe in the dataset.
 pub const RECIPE: &str = "recipe.toml";
@@ -53,6 +55,9 @@ pub struct Recipe {
     /// Samples a pixel of each half of a rendered picture.
     #[serde(default = "default_samples")]
     pub samples: u32,
+    /// The licence of each kind of source, as text; in addition to files that come with scenes.
+    #[serde(default)]
+    pub licences: BTreeMap<SourceKind, String>,
     #[serde(default, rename = "scene")]
     pub scenes: Vec<RecipeScene>,
 }
@@ -90,6 +95,10 @@ impl Recipe {
             let expected = "a version such as `0.1.0`, without control characters";
             faults.push(ValueFault::new("version", format!("{:?}", self.version), expected).into());
         }
+        for (kind, _) in self.licences.iter().filter(|(_, text)| text.trim().is_empty()) {
+            let expected = "the name of a licence, or its text";
+            faults.push(ValueFault::new(format!("licences.{kind}"), "an empty text".to_owned(), expected).into());
+        }
         if self.scenes.is_empty() {
             faults.push(RecipeFault::NoScenes);
         }
@@ -107,6 +116,13 @@ impl Recipe {
             scene.check(&mut faults);
         }
         faults
+    }
+
+    /// The licence that the recipe states for the source of a scene.
+    pub fn licence_of(&self, id: &SceneId) -> Option<Licence> {
+        let kind = self.scenes.iter().find(|scene| scene.id == *id)?.source().ok()?.kind();
+        let text = self.licences.get(&kind)?.clone();
+        Some(Licence { scene: id.clone(), file: RECIPE.to_owned(), text })
     }
 
     fn check_views(&self, faults: &mut Vec<RecipeFault>) {

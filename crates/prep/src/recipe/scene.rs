@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::{PartSetId, SceneId};
+use mateval_dataset::{PartSetId, SceneId, SourceKind};
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::shortened;
 use mateval_sources::front3d::AppearanceRule;
@@ -32,6 +32,9 @@ pub struct RecipeScene {
     pub photo: Option<PathBuf>,
     /// Other materials for the scene's, drawn with a secret key; the source's own if absent.
     pub redress: Option<Redress>,
+    /// Whether others have the files of the source.
+    #[serde(default, rename = "source")]
+    pub availability: Availability,
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
     pub part_labels: BTreeMap<PartSetId, PathBuf>,
@@ -52,6 +55,17 @@ pub struct RecipeScene {
     /// Multiplies every RGB picture before clipping.
     #[serde(default = "default_exposure")]
     pub exposure: f64,
+}
+
+/// Whether others have the files of a scene's source.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Availability {
+    /// Anybody may have them, and can make the truth again.
+    #[default]
+    Public,
+    /// Nobody else has them.
+    Private,
 }
 
 /// What a scene is redressed with. Both paths must lead out of the folder that the recipe's paths are relative to.
@@ -129,6 +143,17 @@ pub(crate) struct SourcePath {
 
 fn default_exposure() -> f64 {
     1.0
+}
+
+impl RecipeSource<'_> {
+    pub fn kind(self) -> SourceKind {
+        match self {
+            Self::Bitterli(_) => SourceKind::Bitterli,
+            Self::Front3d(_) => SourceKind::Front3d,
+            Self::Gltf(_) => SourceKind::Gltf,
+            Self::Blend(_) => SourceKind::Blend,
+        }
+    }
 }
 
 impl RecipeScene {

@@ -371,6 +371,7 @@ mod tests {
             source: SceneSource {
                 kind,
                 house: house.to_owned(),
+                private: false,
                 states_roughness: true,
                 states_metallic: true,
                 shift_m: [0.0; 3],

@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use mateval_dataset::dataset::{DatasetFile, Secrecy};
+use mateval_dataset::dataset::{DatasetFile, Secrecy, SharedLicence};
 use mateval_dataset::scene_cost::StepCost;
 use mateval_dataset::{Finding, RendererId, SceneId, Severity};
 use mateval_prep::stats::StatsFile;
@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::given::{ReferenceScores, SceneVerdict};
-use super::remake::{Remake, SceneInputs, SharedLicence};
+use super::remake::{Remake, SceneInputs};
 use super::renders::{RenderedWith, Thumbnail, ViewNoise};
 use super::table_one::Evaluated;
 

@@ -36,7 +36,7 @@ pub use file::{Publication, ReleaseFile};
 use file::{RELEASE, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, bibtex, withhold};
 use given::{Bounds, SceneVerdict, read_bounds, read_comparisons};
 use page::page;
-use remake::{Remake, SceneInputs, licences, without_licence};
+use remake::{Remake, SceneInputs};
 use renders::{noise, rendered_with, write_thumbnail};
 use table_one::Evaluated;
 
@@ -153,8 +153,8 @@ impl<'a> CheckedRelease<'a> {
             floor: self.bounds.floor.clone(),
             remake: dataset.root.join(RECIPE).is_file().then(|| Remake::of(dataset, &rendered)).transpose()?,
             rendered,
-            licences: licences(&dataset.file),
-            without_licence: without_licence(&dataset.file),
+            licences: dataset.file.shared_licences(),
+            without_licence: dataset.file.without_licence(),
             scenes,
         })
     }
