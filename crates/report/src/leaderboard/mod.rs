@@ -208,7 +208,7 @@ mod tests {
         let add = |method: &str, kind: &str| {
             let path = pictures::place(&set, method, &results[0].dataset.scenes[0], &view, kind);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            png_io::write_rgb_bytes(&path, &Picture::filled(8, 6, [90; 3])).unwrap();
+            png_io::write_rgb_bytes(&path, &Picture::filled(8, 6, [90 + method.len() as u8; 3])).unwrap();
         };
         [pictures::TRUTH, "good", "bad"].into_iter().for_each(|method| add(method, "albedo"));
         let with_votes = |pictures| LeaderboardPlan { pictures, votes: true, ..plan(&results) };
@@ -222,10 +222,22 @@ mod tests {
         let data = page.split("data-board=\"").nth(1).unwrap().split('"').next().unwrap();
         let data = data.replace("&quot;", "\"").replace("&#x2f;", "/").replace("&lt;", "<").replace("&gt;", ">");
         let data: serde_json::Value = serde_json::from_str(&data).unwrap();
-        let shown = serde_json::json!([{
-            "scene": "s00", "view": "input", "picture": "albedo", "methods": ["good", "b-bold-b"]
-        }]);
-        assert_eq!((&data["pictures"], &data["methods"][1]["method"]), (&shown, &"<b>bold</b>".into()));
+        let [shown] = data["pictures"].as_array().unwrap().as_slice() else { panic!("{data}") };
+        assert_eq!([&shown["scene"], &shown["view"], &shown["picture"]], ["s00", "input", "albedo"]);
+        assert_eq!(data["methods"][1]["method"], "<b>bold</b>");
+        // The files are those of the methods, and do not name them.
+        let files = [(pictures::TRUTH, &shown["truth"]), ("good", &shown["methods"][0]["file"])];
+        for (method, file) in files.into_iter().chain([("b-bold-b", &shown["methods"][1]["file"])]) {
+            let file = file.as_str().unwrap();
+            assert!(file.len() == 36 && !file.contains(method), "{file}");
+            let bytes = |path: &std::path::Path| std::fs::read(path).unwrap();
+            assert_eq!(
+                bytes(&out.join("votes").join(file)),
+                bytes(&out.join(format!("pictures/{method}/s00/input/albedo.png")))
+            );
+        }
+        let ids: Vec<&serde_json::Value> = (0..2).map(|at| &shown["methods"][at]["id"]).collect();
+        assert_eq!(ids, ["good", "b-bold-b"]);
         assert_eq!(data["fingerprint"], results[0].protocols["mateval-3"].fingerprint);
         assert!(std::fs::read_to_string(out.join("index.html")).unwrap().contains("votes.html"));
     }

@@ -1,9 +1,12 @@
 //! The page on which people vote: pairs of methods' pictures beside the truth, without names. It works from the disk,
 //! and saves what `votes` counts. Which pairs exist is stated here; the script draws their order and sides for each
-//! voter.
+//! voter. The pictures are copies that are named after their content, since the address of a picture is shown to
+//! whoever points at it.
 
 use std::collections::BTreeSet;
 
+use mateval_files::FileError;
+use mateval_files::untrusted::sha256_of_file;
 use minijinja::context;
 use serde::Serialize;
 
@@ -21,8 +24,8 @@ struct Ballot<'a> {
     tool: &'a str,
     protocol: &'a str,
     fingerprint: &'a str,
-    /// The folder of the truth's pictures.
-    truth: &'static str,
+    /// The folder of the pictures.
+    folder: &'static str,
     methods: Vec<VotedMethod>,
     kinds: Vec<Kind>,
     pictures: Vec<BallotPicture<'a>>,
@@ -34,9 +37,20 @@ struct BallotPicture<'a> {
     scene: &'a str,
     view: &'a str,
     picture: &'a str,
-    /// The ids of these methods.
-    methods: Vec<&'a str>,
+    /// The file of the truth's picture.
+    truth: String,
+    methods: Vec<BallotMethod<'a>>,
 }
+
+#[derive(Serialize)]
+struct BallotMethod<'a> {
+    id: &'a str,
+    /// The file of its picture.
+    file: String,
+}
+
+/// The folder of the page's pictures.
+const FOLDER: &str = "votes";
 
 /// Writes `votes.html`. Fails where no picture can be voted on. What was made from the truth is no method.
 pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
@@ -48,9 +62,12 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
             let kinds = board.pictures.kinds(TRUTH, scene, view);
             for picture in kinds.into_iter().filter(|kind| !kind.ends_with(ERROR)) {
                 let has_it = |head: &&&MethodHead| board.pictures.kinds(&head.id, scene, view).contains(&picture);
-                let methods: Vec<&str> = heads.iter().filter(has_it).map(|head| head.id.as_str()).collect();
-                if methods.len() > 1 {
-                    pictures.push(BallotPicture { scene: scene.as_str(), view, picture, methods });
+                let ids: Vec<&str> = heads.iter().filter(has_it).map(|head| head.id.as_str()).collect();
+                if ids.len() > 1 {
+                    let file = |method: &str| unnamed(site, &format!("{method}/{scene}/{view}/{picture}.png"));
+                    let methods = ids.into_iter().map(|id| Ok(BallotMethod { id, file: file(id)? }));
+                    let methods = methods.collect::<Result<Vec<_>, ReportError>>()?;
+                    pictures.push(BallotPicture { scene: scene.as_str(), view, picture, truth: file(TRUTH)?, methods });
                 }
             }
         }
@@ -58,14 +75,14 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
     if pictures.is_empty() {
         return Err(ReportError::NothingToVoteOn);
     }
-    let is_shown = |id: &str| pictures.iter().any(|picture| picture.methods.contains(&id));
+    let is_shown = |id: &str| pictures.iter().any(|picture| picture.methods.iter().any(|method| method.id == id));
     let shown = ranking.methods.iter().filter(|method| is_shown(&method.id));
     let ballot = Ballot {
         format: VOTES_FORMAT,
         tool: &board.file.tool,
         protocol: &ranking.protocol,
         fingerprint: &ranking.fingerprint,
-        truth: TRUTH,
+        folder: FOLDER,
         methods: shown
             .map(|method| VotedMethod {
                 id: method.id.clone(),
@@ -84,4 +101,14 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         scripts: &["votes.js"],
         values: context! { ballot => serde_json::json!(ballot).to_string() },
     })
+}
+
+/// Copies one of the site's pictures to the page's folder, and returns its name there.
+fn unnamed(site: &SiteWriter<'_>, picture: &str) -> Result<String, ReportError> {
+    let from = site.path("pictures").join(picture);
+    let name = format!("{}.png", &sha256_of_file(&from)?[..32]);
+    let folder = site.path(FOLDER);
+    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+    std::fs::copy(&from, folder.join(&name)).map_err(FileError::io("copy", &from))?;
+    Ok(name)
 }

@@ -52,7 +52,7 @@ pub fn tables(
         Grouping::Dataset | Grouping::Scene => layouts::all(),
         Grouping::Category | Grouping::SuperCategory => layouts::pooled(),
     };
-    filled(&layouts, results, ceiling, protocol, grouping, format)
+    filled(layouts, results, ceiling, protocol, grouping, format)
 }
 
 /// The most informative table: PSNR of albedo, under true light and relit, of the input view and novel ones. Otherwise
@@ -63,11 +63,11 @@ pub fn headline(
     protocol: &str,
     format: TableFormat,
 ) -> Result<String, ReportError> {
-    filled(&[layouts::headline()], results, ceiling, protocol, Grouping::Dataset, format)
+    filled(vec![layouts::headline()], results, ceiling, protocol, Grouping::Dataset, format)
 }
 
 fn filled(
-    layouts: &[layouts::Layout],
+    mut layouts: Vec<layouts::Layout>,
     results: &[ResultFile],
     ceiling: Option<&ResultFile>,
     protocol: &str,
@@ -75,6 +75,10 @@ fn filled(
     format: TableFormat,
 ) -> Result<String, ReportError> {
     check_comparable(results, ceiling, protocol)?;
+    // Readers of a single table must see that its truth is withheld, and what that is worth.
+    if let Some(secrecy) = results.first().and_then(|result| result.dataset.withheld) {
+        layouts.iter_mut().for_each(|layout| layout.title = format!("{} ({})", layout.title, secrecy.text()));
+    }
     let groups = table::groups(results, ceiling, protocol, grouping);
     let tables = layouts.iter().filter_map(|layout| table::Table::fill(layout, grouping, &groups));
     // The other formats end each table with a blank line.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use mateval_dataset::dataset::Secrecy;
 use mateval_dataset::open::DatasetId;
 use mateval_dataset::{InstanceId, SceneId};
 
@@ -93,6 +94,18 @@ fn markdown_by_the_byte() {
 
 ";
     assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Markdown), expected);
+}
+
+#[test]
+fn titles_state_that_the_truth_is_withheld() {
+    let mut withheld = three();
+    withheld.iter_mut().for_each(|result| result.dataset.withheld = Some(Secrecy::NotSecret));
+    let text = TableFormat::Text { bold: false, columns: None };
+    for format in [TableFormat::Markdown, TableFormat::Latex, TableFormat::Csv, text] {
+        let title = "RGB, true light (truth withheld, not secret)";
+        assert!(shown(&withheld, Grouping::Dataset, format).contains(title), "{format:?}");
+        assert!(!shown(&three(), Grouping::Dataset, format).contains("withheld"), "{format:?}");
+    }
 }
 
 /// The twin is bold: its lines have the same letters between escape sequences.

@@ -10,11 +10,12 @@ const below = (count) => crypto.getRandomValues(new Uint32Array(1))[0] % count;
 const sitting = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 
 const pairs = [];
-for (const { scene, view, picture, methods } of board.pictures) {
+for (const { scene, view, picture, truth, methods } of board.pictures) {
   methods.forEach((method, at) => {
     for (const other of methods.slice(at + 1)) {
       const [left, right] = below(2) ? [method, other] : [other, method];
-      pairs.push({ scene, view, picture, left, right });
+      const vote = { scene, view, picture, left: left.id, right: right.id };
+      pairs.push({ vote, files: [left.file, truth, right.file] });
     }
   });
 }
@@ -30,8 +31,7 @@ let saved = 0;
 // When the pair was shown completely; null until then, so that nobody votes on pictures that are not there yet.
 let since = null;
 
-const sources = ({ scene, view, picture, left, right }) =>
-  [left, board.truth, right].map((method) => `pictures/${method}/${scene}/${view}/${picture}.png`);
+const sources = ({ files }) => files.map((file) => `${board.folder}/${file}`);
 
 function buttons() {
   for (const button of form.querySelectorAll("button")) {
@@ -48,7 +48,7 @@ async function show() {
     state.textContent = `These were all ${pairs.length} pairs. Please save your votes.`;
     return;
   }
-  const kind = board.kinds.find((one) => one.word === pair.picture).title;
+  const kind = board.kinds.find((one) => one.word === pair.vote.picture).title;
   state.textContent = `Pair ${votes.length + 1} of ${pairs.length}: ${kind}.`;
   sources(pair).forEach((source, at) => { images[at].src = source; });
   await Promise.allSettled(images.map((image) => image.decode()));
@@ -77,7 +77,7 @@ function act(word) {
     saved = Math.min(saved, votes.length);
   } else {
     if (since === null) return;
-    votes.push({ ...pairs[votes.length], choice: word, seconds: Math.round(performance.now() - since) / 1000 });
+    votes.push({ ...pairs[votes.length].vote, choice: word, seconds: Math.round(performance.now() - since) / 1000 });
   }
   show();
 }
