@@ -14,7 +14,7 @@ use mateval_procedural::value::Type;
 use mateval_procedural::{Graph, Program, Settings};
 use mateval_sources::front3d::finish_of;
 use palette::convert::FromColorUnclamped;
-use palette::{LinSrgb, Oklch};
+use palette::{LinSrgb, Oklab, Oklch};
 
 use super::secret::{Draw, TileFiles};
 use super::surfaces::Place;
@@ -59,6 +59,13 @@ impl Drawn {
         let [roughness, metallic] = drawn_finish(class, draw);
         let [red, green, blue] = color(class, place, draw);
         Self::constant([red, green, blue, roughness, metallic])
+    }
+
+    /// One colour of leaves.
+    pub(super) fn leaf(draw: &mut Draw) -> Self {
+        let [lightness, chroma, hue] = [[0.35, 0.6], [0.05, 0.11], [110.0, 145.0]].map(|range| draw.between(range));
+        let [red, green, blue] = linear(Oklch::new(lightness, chroma, hue));
+        Self::constant([red, green, blue, draw.between([0.4, 0.7]), 0.0])
     }
 
     /// A material of the class for this place: one of the `tiles` if any is of the class, or else a graph.
@@ -258,6 +265,72 @@ fn color(class: MaterialClass, place: Place, draw: &mut Draw) -> [f64; 3] {
     linear(Oklch::new(lightness, chroma, hue))
 }
 
+/// A change of a picture's colours that keeps its motif.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Recoloring {
+    /// Factors of Oklch's lightness and chroma.
+    lightness: f64,
+    chroma: f64,
+    /// The turn of the hue, in degrees.
+    hue: f64,
+    /// What is added to Oklab's a and b, since colours without chroma have no hue to turn.
+    tint: [f64; 2],
+}
+
+impl Recoloring {
+    /// How far colours must change, as the mean distance in Oklab: 0.02 is hardly visible.
+    const LEAST: f64 = 0.1;
+    /// Draws after which the largest change is taken: bright or black pictures cannot change further.
+    const MOST_DRAWS: usize = 32;
+    /// Colours of a picture that the change is measured on.
+    const MEASURED: usize = 4096;
+
+    /// The first of the drawn changes that alters these linear colours enough.
+    pub(super) fn drawn(colors: &[[f32; 3]], draw: &mut Draw) -> Self {
+        let mut best: Option<(f64, Self)> = None;
+        for _ in 0..Self::MOST_DRAWS {
+            let hue = draw.between([20.0, 60.0]) * *draw.one(&[-1.0, 1.0]);
+            let [lightness, chroma] = [[0.7, 1.15], [0.6, 1.2]].map(|range| draw.between(range));
+            let (sin, cos) = libm::sincos(draw.between([0.0, 2.0 * PI]));
+            let strength = draw.between([0.02, 0.07]);
+            let drawn = Self { lightness, chroma, hue, tint: [strength * cos, strength * sin] };
+            let change = drawn.change(colors);
+            if best.is_none_or(|(most, _)| change > most) {
+                best = Some((change, drawn));
+            }
+            if change >= Self::LEAST {
+                break;
+            }
+        }
+        best.expect("there was a draw").1
+    }
+
+    /// A linear colour after the change.
+    pub(super) fn of(&self, rgb: [f32; 3]) -> [f32; 3] {
+        let color = Oklch::from_color_unclamped(linear_rgb(rgb));
+        let turned = Oklch::new(color.l * self.lightness, color.chroma * self.chroma, color.hue + self.hue);
+        let mut lab = Oklab::from_color_unclamped(turned);
+        (lab.a, lab.b) = (lab.a + self.tint[0], lab.b + self.tint[1]);
+        linear(Oklch::from_color_unclamped(lab)).map(|value| value as f32)
+    }
+
+    /// The mean distance in Oklab between colours and what they become.
+    fn change(&self, colors: &[[f32; 3]]) -> f64 {
+        let measured = colors.iter().step_by(colors.len().div_ceil(Self::MEASURED).max(1));
+        let distance = |rgb: &[f32; 3]| {
+            let [from, to] = [*rgb, self.of(*rgb)].map(|rgb| Oklab::from_color_unclamped(linear_rgb(rgb)));
+            ((from.l - to.l).powi(2) + (from.a - to.a).powi(2) + (from.b - to.b).powi(2)).sqrt()
+        };
+        let count = measured.len().max(1) as f64;
+        measured.map(distance).sum::<f64>() / count
+    }
+}
+
+fn linear_rgb(rgb: [f32; 3]) -> LinSrgb<f64> {
+    let [red, green, blue] = rgb.map(f64::from);
+    LinSrgb::new(red, green, blue)
+}
+
 pub(super) fn linear(color: Oklch<f64>) -> [f64; 3] {
     let LinSrgb { red, green, blue, .. } = LinSrgb::from_color_unclamped(color);
     [red, green, blue].map(|value: f64| value.clamp(0.01, 0.95))
@@ -346,6 +419,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Also those of a grey picture, which have no hue, and of a white one; motifs stay.
+    #[test]
+    fn recoloured_pictures_look_different() {
+        let pictures: [&[[f32; 3]]; 4] = [
+            &[[0.2, 0.2, 0.2], [0.5, 0.5, 0.5]],
+            &[[0.9, 0.9, 0.9]],
+            &[[0.35, 0.3, 0.25], [0.1, 0.08, 0.07], [0.6, 0.55, 0.5]],
+            &[[0.5, 0.05, 0.02], [0.02, 0.1, 0.4]],
+        ];
+        for colors in pictures {
+            for number in 0..20 {
+                let found = Recoloring::drawn(colors, &mut draw(&format!("picture {number}")));
+                assert!(found.change(colors) >= Recoloring::LEAST, "{colors:?} {found:?}");
+                let luminance = |rgb: [f32; 3]| 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+                if let [first, second, ..] = colors {
+                    let order = |a: [f32; 3], b: [f32; 3]| luminance(a) > luminance(b);
+                    let is_far = (luminance(*first) - luminance(*second)).abs() > 0.1;
+                    assert!(!is_far || order(*first, *second) == order(found.of(*first), found.of(*second)));
+                }
+            }
+        }
+        // Black cannot change much: the most is taken.
+        let black = Recoloring::drawn(&[[0.0; 3]], &mut draw("black"));
+        assert!(black.change(&[[0.0; 3]]) < 0.3);
     }
 
     /// A picture of vertical stripes of 1/8 of its side: after `size_m * scale` metres the pattern is there again, and

@@ -30,14 +30,12 @@ use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
 use mateval_sources::surface_mesh::connected_parts;
 use mateval_tracer::repaint::SPECULAR;
-use palette::convert::FromColorUnclamped;
-use palette::{LinSrgb, Oklch};
 use rayon::prelude::*;
 
 use charts::{Block, Layout, Parts, texel_of};
-use materials::{Drawn, Values, linear};
+use materials::{Drawn, Recoloring, Values};
 pub(crate) use secret::Secret;
-use surfaces::{Place, Treatment, class_of, lamps, place, treatment};
+use surfaces::{Place, Treatment, class_of, is_leaf, lamps, place, treatment};
 
 /// Colours of parts that differ by less, in sRGB, look alike.
 const ALIKE: f32 = 0.12;
@@ -52,6 +50,7 @@ struct Unit {
     look: usize,
     class: MaterialClass,
     place: Place,
+    is_leaf: bool,
     /// Mean colour of its first part, sRGB.
     color: [f32; 3],
     drawn: Drawn,
@@ -180,20 +179,15 @@ impl Redresser<'_> {
             return *known;
         }
         let mut draw = self.secret.draw(self.id, &format!("recolored {material}"));
-        let hue = draw.between([20.0, 60.0]) * *draw.one(&[-1.0, 1.0]);
-        let [lightness, chroma] = [[0.85, 1.1], [0.6, 1.05]].map(|range| draw.between(range));
-        let other = |rgb: [f32; 3]| {
-            let [red, green, blue] = rgb.map(f64::from);
-            let color = Oklch::from_color_unclamped(LinSrgb::new(red, green, blue));
-            linear(Oklch::new(color.l * lightness, color.chroma * chroma, color.hue + hue)).map(|value| value as f32)
-        };
         let mut new = Material { name: self.new_name(), ..self.materials[material].clone() };
         if let Some(color) = main_color(&mut new) {
             match color {
-                ColorInput::Constant(rgb) => *rgb = other(*rgb),
+                ColorInput::Constant(rgb) => *rgb = Recoloring::drawn(&[*rgb], &mut draw).of(*rgb),
                 ColorInput::Texture { texture, .. } => {
                     let own = &self.textures[texture.0];
-                    let texels: Vec<[u8; 3]> = own.linear_texels().map(|rgb| other(rgb).map(srgb_byte)).collect();
+                    let colors: Vec<[f32; 3]> = own.linear_texels().collect();
+                    let other = Recoloring::drawn(&colors, &mut draw);
+                    let texels: Vec<[u8; 3]> = colors.iter().map(|rgb| other.of(*rgb).map(srgb_byte)).collect();
                     *texture = self.add_texture(own.width(), own.height(), Texels::Srgb8(texels), own.wrap());
                 }
             }
@@ -277,10 +271,11 @@ impl Redresser<'_> {
         color: [f32; 3],
         part: &str,
     ) -> Result<usize, ImageError> {
+        let is_leaf = is_leaf(class, color);
         let apart = |unit: &Unit| (0..3).map(|c| (unit.color[c] - color[c]).abs()).fold(0.0, f32::max);
         let same = (0..self.units.len()).filter(|at| {
             let unit = &self.units[*at];
-            (unit.look, unit.class, unit.place) == (look, class, place)
+            (unit.look, unit.class, unit.place, unit.is_leaf) == (look, class, place, is_leaf)
         });
         let same: Vec<usize> = same.collect();
         let nearest = same.iter().copied().min_by(|a, b| apart(&self.units[*a]).total_cmp(&apart(&self.units[*b])));
@@ -294,9 +289,10 @@ impl Redresser<'_> {
                 let [red, green, blue] = color.map(|value| f64::from(linear_from_srgb(value)));
                 Drawn::constant([red, green, blue, GLASS_ROUGHNESS, 0.0])
             }
+            _ if is_leaf => Drawn::leaf(&mut draw),
             _ => Drawn::new(class, place, &self.secret.tiles, &mut draw)?,
         };
-        self.units.push(Unit { look, class, place, color, drawn });
+        self.units.push(Unit { look, class, place, is_leaf, color, drawn });
         Ok(self.units.len() - 1)
     }
 

@@ -9,8 +9,11 @@ use mateval_dataset::dataset::WeakReason;
 use mateval_dataset::material::{ColorInput, Material, MaterialClass, MaterialModel, ScalarInput};
 use mateval_dataset::reference::{Emission, ReferenceScene, Surface};
 use mateval_image::Texture;
+use mateval_image::transfer::linear_from_srgb;
 use mateval_sources::front3d::class_named;
 use mateval_sources::source_scene::InstanceOrigin;
+use palette::convert::FromColorUnclamped;
+use palette::{LinSrgb, Oklch};
 
 /// What happens to a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,6 +194,17 @@ pub(super) fn class_of(origin: &InstanceOrigin, part: usize, name: &str, materia
         })
 }
 
+/// Whether a part that is said to be of a hard class is green as leaves are: models state one class for a piece of
+/// furniture with all that stands on it.
+pub(super) fn is_leaf(class: MaterialClass, srgb: [f32; 3]) -> bool {
+    use MaterialClass as Is;
+    let is_hard = matches!(class, Is::Wood | Is::Board | Is::Stone | Is::Metal | Is::Wicker | Is::Tile);
+    let [red, green, blue] = srgb.map(|value| f64::from(linear_from_srgb(value)));
+    let color = Oklch::from_color_unclamped(LinSrgb::new(red, green, blue));
+    let hue = color.hue.into_positive_degrees();
+    is_hard && color.chroma > 0.033 && color.l < 0.65 && (100.0..165.0).contains(&hue)
+}
+
 /// The lower-case words of names, which are also divided where a capital follows a small letter.
 fn words_of(names: &[&str]) -> Vec<String> {
     let mut words = vec![String::new()];
@@ -220,6 +234,19 @@ mod tests {
             words_of(&["wall_paper 2", "WallInner", "TV-Stand"]),
             ["wall", "paper", "wall", "inner", "tv", "stand"]
         );
+    }
+
+    /// The leaves of a plant on a stool and of one on a nightstand; green lacquer, wood and pale stone are none.
+    #[test]
+    fn leaves_are_no_wood() {
+        let [leaf, dull] = [[60, 90, 30], [84, 94, 72]];
+        let [wood, stone, shade] = [[150, 110, 70], [180, 190, 170], [90, 90, 88]];
+        let is = |class, bytes: [u8; 3]| is_leaf(class, bytes.map(|byte| f32::from(byte) / 255.0));
+        for class in [MaterialClass::Wood, MaterialClass::Stone] {
+            assert!(is(class, leaf) && is(class, dull), "{class}");
+            assert!(!is(class, wood) && !is(class, stone) && !is(class, shade), "{class}");
+        }
+        assert!(!is(MaterialClass::Lacquer, leaf) && !is(MaterialClass::Cloth, leaf));
     }
 
     #[test]
