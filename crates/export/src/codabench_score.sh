@@ -57,6 +57,7 @@ as_html() { sed 's/&/\&amp;/g; s/</\&lt;/g'; }
     echo '</pre>'
     if [ "$numbers" = whole ]; then
         echo '<h1>Base colours: the truth, then the submission</h1>'
+        echo '<p>A row is a view. In novel views, what the photo shows is darkened. Black is not scored.</p>'
         mateval eval pictures "$submission" --dataset "$input/ref" --out "$work/pictures" > /dev/null
         for picture in "$work"/pictures/*-albedo.png; do
             printf '<h2>%s</h2><img alt="" src="data:image/png;base64,' "$(basename "$picture" -albedo.png | as_html)"

@@ -26,7 +26,16 @@ pub(super) struct Column {
     /// As in `PSNR`.
     pub(super) metric_title: &'static str,
     pub(super) better: Better,
+    /// The least part of the axis that charts of this column show.
+    pub(super) least_span: f64,
     pub(super) is_shown: bool,
+}
+
+/// The least part of an axis that a chart of a metric shows: a hundred steps of the last shown digit, as 1 dB, so that a
+/// difference that hardly matters does not fill the chart.
+pub(super) fn least_span(metric: Metric) -> f64 {
+    let style = metric.style();
+    100.0 / (style.scale * 10_f64.powi(style.digits as i32))
 }
 
 impl Column {
@@ -46,6 +55,7 @@ impl Column {
             title: format!("{}, {}{region}", picture.kind.title(), views.title().to_lowercase()),
             metric_title: metric.style().title,
             better: metric.better(),
+            least_span: least_span(metric),
             is_shown: is_shown(key),
         }
     }

@@ -15,7 +15,7 @@ use minijinja::value::Serde;
 use serde::Serialize;
 
 use super::board::Board;
-use super::columns::{Column, headlines};
+use super::columns::{Column, headlines, least_span};
 use super::entries::is_in_curves;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
@@ -95,7 +95,7 @@ fn section(board: &Board<'_>, kind: PerturbationKind) -> Option<Section> {
         .filter_map(|column| {
             let title = format!("{}, {}", column.title, column.metric_title);
             let level = |level| if level == 0 { "true".to_owned() } else { format!("level {level}") };
-            Chart::new(title, level, &by_level(board, kind, column), |value| column.text(value))
+            Chart::new(title, level, &by_level(board, kind, column), column.least_span, |value| column.text(value))
         })
         .collect();
     let title = match kind {
@@ -162,7 +162,7 @@ fn chart(methods: &[Method<'_>], axis: Axis, (picture, metric): (PictureName, Me
     let means: Vec<Values<'_>> =
         methods.iter().map(|method| (method.name, means(method, axis, picture, metric))).collect();
     let title = format!("{}, {}", picture.kind.title(), metric.style().title);
-    Chart::new(title, |class| class_title(axis, class), &means, |value| metric.style().text(value))
+    Chart::new(title, |class| class_title(axis, class), &means, least_span(metric), |value| metric.style().text(value))
 }
 
 /// The mean of a method's values in each class.
@@ -226,11 +226,13 @@ struct Line {
 type Values<'a> = (&'a str, BTreeMap<u32, f64>);
 
 impl Chart {
-    /// None where there are fewer than two classes, which make no line.
+    /// None where there are fewer than two classes, which make no line. The axis shows at least a part of `least_span`,
+    /// with the values in its middle.
     fn new(
         title: String,
         class_title: impl Fn(u32) -> String,
         methods: &[Values<'_>],
+        least_span: f64,
         text: impl Fn(f64) -> String,
     ) -> Option<Self> {
         let classes: BTreeSet<u32> = methods.iter().flat_map(|(_, values)| values.keys().copied()).collect();
@@ -239,6 +241,8 @@ impl Chart {
         }
         let values = || methods.iter().flat_map(|(_, values)| values.values()).copied();
         let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let margin = ((least_span - (high - low)) / 2.0).max(0.0);
+        let (low, high) = (low - margin, high + margin);
         let [width, height] = SIZE;
         let (first, last) = (*classes.first()?, *classes.last()?);
         let column = |class: u32| {
@@ -289,15 +293,23 @@ mod tests {
     #[test]
     fn the_highest_is_at_the_top_and_the_first_class_on_the_left() {
         let methods = [("a", BTreeMap::from([(2, 30.0), (3, 25.0), (6, 10.0)])), ("b", BTreeMap::from([(2, 10.0)]))];
-        let chart = Chart::new("t".to_owned(), |class| class.to_string(), &methods, |v| format!("{v:.1}")).unwrap();
-        assert_eq!(chart.classes, ["2", "3", "6"]);
+        let chart = |methods: &[Values<'_>]| {
+            Chart::new("t".to_owned(), |class| class.to_string(), methods, 1.0, |v| format!("{v:.1}"))
+        };
         let [width, height] = SIZE;
         let (left, right) = (MARGIN[0], width - MARGIN[0]);
+        // A difference of 0.04 dB does not fill the chart.
+        let alike = chart(&[("a", BTreeMap::from([(2, 30.04), (3, 30.0)]))]).unwrap();
+        let middle = height / 2.0;
+        assert!(alike.lines[0].dots.iter().all(|[_, y]| (y - middle).abs() < 4.0), "{alike:?}");
+        assert_eq!(alike.scale.map(|(_, text)| text), ["30.5", "29.5"]);
+        let chart = chart(&methods).unwrap();
+        assert_eq!(chart.classes, ["2", "3", "6"]);
         assert_eq!(chart.lines[0].dots, [[left, MARGIN[1]], [left + 66.0, 53.0], [right, height - MARGIN[1]]]);
         assert_eq!(chart.lines[1].cells, [Some("10.0".to_owned()), None, None]);
         assert_eq!(chart.scale, [(MARGIN[1], "30.0".to_owned()), (height - MARGIN[1], "10.0".to_owned())]);
         let one = [("a", BTreeMap::from([(2, 30.0)]))];
-        assert_eq!(Chart::new("t".to_owned(), |class| class.to_string(), &one, |v| v.to_string()), None);
+        assert_eq!(Chart::new("t".to_owned(), |class| class.to_string(), &one, 1.0, |v| v.to_string()), None);
     }
 
     fn value(view: &str, number: f64) -> PictureValues {

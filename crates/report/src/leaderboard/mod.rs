@@ -27,6 +27,7 @@ mod votes_page;
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use mateval_dataset::dataset::Secrecy;
 use mateval_dataset::{Progress, Report};
 use mateval_files::work_folder::{WorkFolder, check_free};
 
@@ -96,6 +97,7 @@ fn site(board: &Board<'_>, votes: bool) -> Site {
         fingerprint: ranking.fingerprint.clone(),
         scenes: ranking.scenes.len(),
         houses: ranking.houses.values().collect::<BTreeSet<_>>().len(),
+        withheld: board.results.first().and_then(|result| result.dataset.withheld).map(Secrecy::text),
         has_intervals: board.has_intervals(),
         least_houses: ranking.rules.least_houses,
         pages: PAGES

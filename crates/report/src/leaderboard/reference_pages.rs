@@ -1,7 +1,7 @@
 //! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers
 //! were measured on other renders and are never ranked with results.
 
-use mateval_dataset::dataset::{DatasetVersion, Secrecy};
+use mateval_dataset::dataset::DatasetVersion;
 use mateval_eval::metric::{Better, Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::key::Views;
@@ -48,7 +48,6 @@ pub(super) fn write(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWr
 fn write_about(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let mut said = String::new();
     push_html(&mut said, Parser::new(plan.about.unwrap_or_default()).map(harmless));
-    let withheld = board.results.first().and_then(|result| result.dataset.withheld).map(Secrecy::text);
     let count = |state| plan.verified.iter().filter(|mark| **mark == state).count();
     site.page(&Page {
         file: "about.html",
@@ -56,7 +55,7 @@ fn write_about(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<
         title: "About",
         scripts: &[],
         values: context! {
-            said, withheld, dataset => Serde(&board.file.dataset),
+            said, dataset => Serde(&board.file.dataset),
             verified => count(Verified::Confirmed), claimed => count(Verified::Claimed) + count(Verified::Stale),
         },
     })
@@ -83,7 +82,7 @@ struct ProtocolPage<'a> {
     dataset: &'a DatasetVersion,
     weights: Option<&'a String>,
     protocol_sha256: String,
-    rules: Vec<(String, String)>,
+    rules: Vec<Rule>,
     ranking: &'a RankingRules,
     percent: u32,
     /// How intervals were found; none if there are no intervals.
@@ -113,13 +112,49 @@ fn write_protocol(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Report
     })
 }
 
-/// Every number and word of a protocol, with the path of its key.
-fn rules_of(protocol: &Protocol) -> Vec<(String, String)> {
+/// A number or word of a protocol.
+#[derive(Serialize)]
+struct Rule {
+    /// The path of its key.
+    path: String,
+    value: String,
+    /// What the key means, in the words of the protocol's schema.
+    meaning: String,
+}
+
+/// Every number and word of a protocol.
+fn rules_of(protocol: &Protocol) -> Vec<Rule> {
     let mut rules = Vec::new();
     // From its JSON text, which gives single-precision numbers with as few digits as they need.
     let value = serde_json::from_str(&mateval_dataset::json::to_text(protocol)).unwrap_or(Value::Null);
     leaves(&value, String::new(), &mut rules);
-    rules
+    let schema = schemars::schema_for!(Protocol);
+    let rule = |(path, value): (String, String)| {
+        let meaning = meaning(schema.as_value(), &path).unwrap_or_default().replace('`', "");
+        Rule { path, value, meaning }
+    };
+    rules.into_iter().map(rule).collect()
+}
+
+/// The description of the key at a path, or else of its type.
+fn meaning<'a>(schema: &'a Value, path: &str) -> Option<&'a str> {
+    let resolved = |at: &'a Value| match at.get("$ref").and_then(Value::as_str) {
+        Some(place) => schema.pointer(place.trim_start_matches('#')).unwrap_or(at),
+        None => at,
+    };
+    let described = |at: &'a Value| at.get("description").and_then(Value::as_str);
+    let (mut at, mut said) = (schema, None);
+    for word in path.split('.') {
+        // Keys that may be null are a choice between their type and null.
+        let own = resolved(at);
+        let choices = own.get("anyOf").and_then(Value::as_array).and_then(|choices| choices.first());
+        let own = choices.map_or(own, resolved);
+        // Constants by name are described together.
+        let by_name = || own.get("additionalProperties").filter(|values| values.is_object());
+        at = own.get("properties").and_then(|keys| keys.get(word)).or_else(by_name)?;
+        said = described(at).or_else(|| described(resolved(at))).or(said);
+    }
+    said
 }
 
 fn leaves(value: &Value, path: String, rules: &mut Vec<(String, String)>) {
@@ -259,6 +294,18 @@ mod tests {
         assert!(!shown.contains("https://g"), "{shown}");
         // Twin.
         assert!(html("[paper](https://e.org/a)").contains("<a href=\"https://e.org/a\">paper</a>"));
+    }
+
+    #[test]
+    fn every_rule_has_a_meaning() {
+        for name in ["mateval-3", "paper"] {
+            let rules = rules_of(&Protocol::named(name).unwrap());
+            assert!(rules.len() > 60, "{name}");
+            let silent: Vec<&str> =
+                rules.iter().filter(|rule| rule.meaning.is_empty()).map(|rule| rule.path.as_str()).collect();
+            assert!(silent.is_empty(), "{name}: {silent:?}");
+        }
+        assert_eq!(meaning(schemars::schema_for!(Protocol).as_value(), "light.no_key"), None);
     }
 
     #[test]

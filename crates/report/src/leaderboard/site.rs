@@ -48,6 +48,8 @@ pub(super) struct Site {
     pub(super) fingerprint: String,
     pub(super) scenes: usize,
     pub(super) houses: usize,
+    /// That the truth is withheld, and what that is worth; none if it is public.
+    pub(super) withheld: Option<&'static str>,
     /// Whether there are enough houses for intervals, ranks and comparisons of pairs.
     pub(super) has_intervals: bool,
     /// The fewest houses for which there are intervals.

@@ -49,9 +49,9 @@ function addColumn(column, at) {
   if (table.tFoot) place(table.tFoot.rows[0], cell("td", column.ceiling ?? "–"));
 }
 
-function headCell({ key, picture, views, metric, region, better, title, metric_title }) {
+function headCell({ key, picture, views, metric, region, better, least_span: least, title, metric_title }) {
   const made = Object.assign(document.createElement("th"), { scope: "col" });
-  Object.assign(made.dataset, { key, picture, views, metric, region, better });
+  Object.assign(made.dataset, { key, picture, views, metric, region, better, least });
   const arrow = cell("span", better === "higher" ? "↑" : "↓");
   arrow.setAttribute("aria-hidden", "true");
   const words = Object.assign(cell("span", `${better} is better`), { className: "unseen" });
@@ -115,8 +115,10 @@ function drawIntervals(head) {
   table.querySelectorAll("td svg").forEach((old) => old.remove());
   const cells = [...table.tBodies[0].rows].map((row) => row.cells[head.cellIndex]).filter((cell) => cell.dataset.l);
   if (!cells.length) return;
-  const low = Math.min(...cells.map((cell) => Number(cell.dataset.l)));
-  const span = Math.max(...cells.map((cell) => Number(cell.dataset.h))) - low || 1;
+  // At least a part of the axis that matters, with the intervals in its middle.
+  const ends = [Math.min(...cells.map((cell) => Number(cell.dataset.l))), Math.max(...cells.map((cell) => Number(cell.dataset.h)))];
+  const span = Math.max(ends[1] - ends[0], Number(head.dataset.least));
+  const low = (ends[0] + ends[1] - span) / 2;
   const x = (value) => 4 + (92 * (Number(value) - low)) / span;
   for (const cell of cells) {
     const { l, v, h } = cell.dataset;
