@@ -56,6 +56,7 @@ mod suite {
     mod stated;
     mod stats;
     mod survey;
+    mod twins;
     mod unsound_submissions;
     mod verify_faults;
     mod wide_views;

@@ -79,8 +79,9 @@ pub struct ExportPlaces {
 }
 
 impl Places {
+    /// Opens the dataset as methods see it.
     pub fn open(&self) -> anyhow::Result<Dataset> {
-        open_dataset(&self.dataset)
+        Ok(open_dataset(&self.dataset)?.with_twins())
     }
 
     /// Opens the dataset, and says which of the estimate's files are read for it, and what may be wrong with them.
@@ -96,8 +97,9 @@ impl Places {
 }
 
 impl ExportPlaces {
+    /// Opens the dataset as methods see it.
     pub fn open(&self) -> anyhow::Result<Dataset> {
-        open_dataset(&self.dataset)
+        Ok(open_dataset(&self.dataset)?.with_twins())
     }
 
     /// Opens the dataset, and says which of the estimate's files are read for it, and what may be wrong with them.
@@ -107,7 +109,7 @@ impl ExportPlaces {
 }
 
 fn open_for(dataset: &Path, source: &EstimateSource) -> anyhow::Result<Dataset> {
-    let dataset = open_dataset(dataset)?;
+    let dataset = open_dataset(dataset)?.with_twins();
     if let Some(text) = source.files_read(&dataset) {
         say(&text);
     }

@@ -91,7 +91,7 @@ impl LintArgs {
     /// Checks the submission; the answer is no where it has an error.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         self.out.iter().try_for_each(|out| check_output_file(out, "--out", "report", self.force))?;
-        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?;
+        let dataset = Dataset::open(&self.dataset).context("cannot open the dataset")?.with_twins();
         let file = lint_report(self, &dataset).context("cannot check the submission")?;
         self.out.iter().try_for_each(|out| json::write(out, &file))?;
         match self.format {

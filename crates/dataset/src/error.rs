@@ -72,6 +72,13 @@ pub enum DatasetError {
     },
     #[error("'{}' has no scene {}; it has {}", dataset.display(), quoted(unknown), quoted(known))]
     UnknownScenes { dataset: PathBuf, unknown: Vec<SceneId>, known: Vec<SceneId> },
+    /// Twins are named for work that is done on the scene that they show.
+    #[error(
+        "'{}': {} shares the truth of another scene and has no renders or scores of its own; name {} instead, which \
+         takes its twins along",
+        dataset.display(), quoted(twins), quoted(of)
+    )]
+    Twins { dataset: PathBuf, twins: Vec<SceneId>, of: Vec<SceneId> },
     #[error(
         "'{}' would lie in the dataset '{}', whose manifest does not list it; choose another {place}",
         path.display(), dataset.display()

@@ -22,8 +22,11 @@ pub struct Dataset {
     pub file: DatasetFile,
     /// `targets.json`, what is scored.
     pub targets: TargetsFile,
-    /// `scene.json` of every scene whose folder exists, in the dataset's order.
+    /// `scene.json` of every scene whose folder exists, in the dataset's order; without twins, unless they were
+    /// asked for by [`Self::with_twins`].
     pub scenes: Vec<SceneFile>,
+    /// `scene.json` of every twin whose folder exists.
+    pub twins: Vec<SceneFile>,
     /// The scenes that `dataset.json` and the manifest list and whose whole folder is missing, in the dataset's order:
     /// each scene can be downloaded on its own.
     pub absent: Vec<SceneId>,
@@ -51,17 +54,34 @@ impl Dataset {
         check_hashes(root, |path| path == TARGETS || (is_scene(path) && !is_below(path, &absent)))?;
         let mut faults = Vec::new();
         let targets = read_targets(root).map_err(|fault| faults.push((TARGETS.to_owned(), fault))).ok();
-        let mut scenes = Vec::new();
+        let (mut scenes, mut twins) = (Vec::new(), Vec::new());
         for id in file.scenes.iter().filter(|id| !absent.contains(id)) {
             match read_scene(root, id) {
+                Ok(scene) if file.twins.contains_key(id) => twins.push(scene),
                 Ok(scene) => scenes.push(scene),
                 Err(fault) => faults.push((format!("scenes/{id}/scene.json"), fault)),
             }
         }
         match targets {
-            Some(targets) if faults.is_empty() => Ok(Self { root: root.to_owned(), file, targets, scenes, absent }),
+            Some(targets) if faults.is_empty() => {
+                Ok(Self { root: root.to_owned(), file, targets, scenes, twins, absent })
+            }
             _ => Err(together(root, faults)),
         }
+    }
+
+    /// The dataset as methods see it: twins are scenes like any other.
+    pub fn with_twins(mut self) -> Self {
+        self.scenes.append(&mut self.twins);
+        let place = |scene: &SceneFile| self.file.scenes.iter().position(|id| *id == scene.id);
+        self.scenes.sort_by_key(place);
+        self
+    }
+
+    /// The twins of a scene that are not absent.
+    pub fn twins_of(&self, scene: &SceneId) -> impl Iterator<Item = &SceneFile> {
+        let is_twin = move |other: &&SceneFile| self.file.twins.get(&other.id).is_some_and(|found| found.of == *scene);
+        self.scenes.iter().chain(&self.twins).filter(is_twin)
     }
 
     /// Fails where a file of the scene differs from the manifest, since results made from it would not deserve the
@@ -71,14 +91,16 @@ impl Dataset {
         check_hashes(&self.root, |path| path.strip_prefix(&folder).is_some_and(&concerns))
     }
 
-    /// The scenes with these ids, in the dataset's order; all that are not absent where `ids` is empty. Fails where an
-    /// id is unknown or its scene is absent, and where every scene is.
+    /// The scenes with these ids, in the dataset's order; all that are neither absent nor twins where `ids` is empty.
+    /// Fails where an id is unknown or its scene is absent or a twin, and where every scene is absent.
     pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, DatasetError> {
         let chosen = known_ids(&self.root, &self.file, ids)?;
+        check_no_twins(&self.root, &self.file, ids)?;
         let is_needed = |id: &&SceneId| ids.contains(id) || self.scenes.is_empty();
         let absent = self.absent.iter().filter(is_needed).cloned().collect();
         check_none_absent(&self.root, &self.file, absent)?;
-        Ok(self.scenes.iter().filter(|scene| chosen.contains(&&scene.id)).collect())
+        let is_chosen = |scene: &&SceneFile| chosen.contains(&&scene.id) && !self.file.twins.contains_key(&scene.id);
+        Ok(self.scenes.iter().filter(is_chosen).collect())
     }
 
     /// Fails where a scene is absent, for work that needs all scenes.
@@ -100,10 +122,11 @@ impl Dataset {
         Ok(chosen[0])
     }
 
-    /// The renderer that made the scene's input picture; absent if the dataset has no photo renderer, or where the
-    /// scene has a photo from elsewhere, whose light is not known.
+    /// The renderer whose pictures the scene has; absent if the dataset has no photo renderer, where the scene has a
+    /// photo from elsewhere, whose light is not known, and for a twin, whose photo is made of another scene's pictures.
     pub fn photo_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
-        self.file.photo_renderer.as_ref().filter(|_| scene.photo.is_none())
+        let is_rendered = scene.photo.is_none() && !self.file.twins.contains_key(&scene.id);
+        self.file.photo_renderer.as_ref().filter(|_| is_rendered)
     }
 
     /// Whether its ground truth is withheld, or meant to be: it is a hidden split, or has scenes whose truth is a secret.
@@ -141,11 +164,22 @@ impl Dataset {
     }
 }
 
-/// The ids among `ids` in the order of the dataset in `root`; all its ids where `ids` is empty. Fails where an id is
-/// unknown, or where the folder of any scene is missing: this serves work that rewrites the manifest.
+/// The ids among `ids` in the order of the dataset in `root`; all its ids but those of twins where `ids` is empty. Fails
+/// where an id is unknown or that of a twin, or where the folder of any scene is missing: this serves work that rewrites
+/// the manifest.
 pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, DatasetError> {
     check_whole(root, file)?;
-    known_ids(root, file, ids)
+    check_no_twins(root, file, ids)?;
+    let known = known_ids(root, file, ids)?;
+    Ok(known.into_iter().filter(|id| !file.twins.contains_key(id)).collect())
+}
+
+/// Fails where one of the ids is a twin's.
+fn check_no_twins(root: &Path, file: &DatasetFile, ids: &[SceneId]) -> Result<(), DatasetError> {
+    let twins: Vec<SceneId> = ids.iter().filter(|id| file.twins.contains_key(id)).cloned().collect();
+    let mut of: Vec<SceneId> = twins.iter().filter_map(|id| Some(file.twins.get(id)?.of.clone())).collect();
+    of.dedup();
+    if twins.is_empty() { Ok(()) } else { Err(DatasetError::Twins { dataset: root.to_owned(), twins, of }) }
 }
 
 /// Fails where the folder of a scene that `file`, the `dataset.json` in `root`, lists is missing.
@@ -297,7 +331,7 @@ pub struct DatasetId {
     pub manifest_sha256: String,
     /// The scenes that were scored, in the dataset's order.
     pub scenes: Vec<SceneId>,
-    /// The number of scenes of the dataset.
+    /// The number of scenes of the dataset, without twins where these are not scored by themselves.
     pub total_scenes: usize,
     /// The house of each scored scene. Rankings draw scenes of one house together.
     #[serde(default)]
@@ -326,12 +360,14 @@ impl DatasetId {
     /// Describes a dataset of which `scenes` are scored or checked.
     pub fn new<'a>(dataset: &Dataset, scenes: impl IntoIterator<Item = &'a SceneFile>) -> Self {
         let scenes: Vec<&SceneFile> = scenes.into_iter().collect();
+        let twins = &dataset.file.twins;
+        let counts_twins = scenes.iter().any(|scene| twins.contains_key(&scene.id));
         Self {
             name: dataset.file.name.clone(),
             version: dataset.file.version.clone(),
             manifest_sha256: dataset.file.manifest_sha256.clone(),
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
-            total_scenes: dataset.file.scenes.len(),
+            total_scenes: dataset.file.scenes.len() - if counts_twins { 0 } else { twins.len() },
             houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
             sources: scenes.iter().map(|scene| (scene.id.clone(), scene.source.kind)).collect(),
             wide_views: scenes.iter().filter_map(|scene| Some((scene.id.clone(), wide_views(scene)?))).collect(),
@@ -402,6 +438,7 @@ mod tests {
             version: String::new(),
             tool: String::new(),
             scenes: vec![room.clone(), hall.clone()],
+            twins: BTreeMap::new(),
             photo_renderer: None,
             licences: Vec::new(),
             geometry: None,

@@ -44,7 +44,6 @@ pub mod light {
     //! Submissions under light.
     pub mod difference;
     pub mod fitted_lights;
-    pub mod lighting;
     pub mod mse;
     pub mod own_lights;
     pub mod reference;

@@ -8,6 +8,7 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::{InstanceId, SceneId, ViewId};
 use mateval_files::FileError;
 use mateval_image::exr_io::Precision;
@@ -15,7 +16,6 @@ use mateval_image::{LinearRgb, Picture, exr_io};
 
 use crate::error::EvalError;
 use crate::light::difference::{ViewGuide, guided_mean, mean_of};
-use crate::light::lighting::LightingName;
 use crate::materials::pictures::MaterialPictures;
 
 pub struct PicturesDir {

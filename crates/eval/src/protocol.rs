@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::SceneId;
+use mateval_dataset::lighting::RelitRules;
 use mateval_dataset::material::PrincipledFlavour;
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_stage::StageRules;
@@ -161,23 +162,6 @@ pub struct LightRules {
     pub samples: SampleRules,
 }
 
-/// The weights of track `relit`. Groups are ordered by the luminance of R's input view under each alone, over valid
-/// pixels, brightest first; groups that bring less than [`Self::least_share`] of it are left out of the order. Every
-/// lighting is then scaled so that R's input view has the mean luminance that it has under the scene's own lights.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RelitRules {
-    /// Lighting `warm_cool`: the weights of the first, third, ... group, by channel.
-    pub warm: [f64; 3],
-    /// Lighting `warm_cool`: the weights of the second, fourth, ... group.
-    pub cool: [f64; 3],
-    /// The number of lightings `alone_1`, `alone_2`, ..., in which one group has weight 1 and all others 0. Scenes of
-    /// one group have none.
-    pub alone_at_most: usize,
-    /// The smallest share of the light of a group that takes part.
-    pub least_share: f64,
-}
-
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleRules {
@@ -219,7 +203,7 @@ impl LightRules {
             roulette_survival: settings.roulette_survival,
             stage: StageRules::default(),
             fit: FitRules::default(),
-            relit: RelitRules { warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 1, least_share: 0.05 },
+            relit: RelitRules::with_alone(1),
             samples: SampleRules { seed: "mateval".to_owned(), at_320x240: 32, least: 16, most: 64, block_pixels: 16 },
         }
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::dataset::Perturbation;
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::DatasetId;
 use mateval_dataset::submission::Cost;
 use mateval_dataset::word_enum::UnknownWord;
@@ -11,7 +12,6 @@ use mateval_light::light_fit::FittedRadiances;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::light::lighting::LightingName;
 use crate::metric::{Metric, PictureKind};
 use crate::protocol::Protocol;
 use crate::result::key::{PictureName, Region, ResultKey, Views};

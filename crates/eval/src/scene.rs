@@ -6,6 +6,7 @@ use std::path::Path;
 
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::{Progress, RendererId, SceneId, TriangleMesh, ViewId};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_fit::FittedRadiances;
@@ -16,7 +17,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::light::difference::base_color_ratio;
-use crate::light::lighting::LightingName;
 use crate::light::mse::LightMse;
 use crate::light::reference::StoredReference;
 use crate::metric::PictureKind;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, TriangleMesh, ViewId};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
@@ -11,7 +12,6 @@ use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 use crate::error::EvalError;
-use crate::light::lighting::LightingName;
 use crate::light::reference::StoredReference;
 use crate::light::score::compare_under_lights;
 use crate::materials::pictures::material_pictures;

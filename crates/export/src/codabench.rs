@@ -71,7 +71,10 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
         Some(seconds) => (of.limit / seconds.max(1)) as usize,
         None => usize::MAX,
     };
-    let SoundDataset { dataset, mut files } = SoundDataset::open(&of.dataset, Format::Croissant, progress)?;
+    let SoundDataset { mut dataset, mut files } = SoundDataset::open(&of.dataset, Format::Croissant, progress)?;
+    // Tasks are slices of the scored scenes. The twins of a scene lie in its task.
+    (dataset.twins, dataset.scenes) =
+        dataset.scenes.into_iter().partition(|scene| dataset.file.twins.contains_key(&scene.id));
     // What a split withholds lies in its private folder, or with the rest.
     let truth = of.private.as_ref().unwrap_or(&of.dataset);
     let mut withheld = Vec::new();
@@ -91,6 +94,8 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
     for (at, slice) in slices.iter().enumerate() {
         progress(Report::part(&format!("task {}", at + 1), at, slices.len()));
         let slice: Vec<SceneId> = slice.iter().map(|id| (*id).clone()).collect();
+        let twins = slice.iter().flat_map(|id| dataset.twins_of(id)).map(|twin| twin.id.clone());
+        let slice: Vec<SceneId> = slice.iter().cloned().chain(twins).collect();
         let belongs = |file: &&String| !file.starts_with("scenes/") || is_below(file, &slice);
         let reference = out.join(format!("data/reference_{at}"));
         let public = files.iter().map(|file| (&of.dataset, file));

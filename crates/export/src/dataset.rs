@@ -106,13 +106,14 @@ impl SoundDataset {
     /// Opens the dataset in `root` and hashes its files. Fails where one is changed, missing, hidden or not listed, or
     /// where the format needs scenes or pictures that do not exist.
     pub fn open(root: &Path, format: Format, progress: Progress<'_>) -> Result<Self, ExportError> {
-        let dataset = Dataset::open(root)?;
+        let dataset = Dataset::open(root)?.with_twins();
         if format.needs_all_scenes() {
             dataset.check_whole()?;
         } else if let Some(absence) = dataset.absence() {
             progress(Report::Message(&absence));
         }
-        let is_rendered = |scene: &SceneFile| scene.photo.is_some() || dataset.photo_renderer(scene).is_some();
+        let has_photo = |scene: &SceneFile| scene.photo.is_some() || dataset.file.twins.contains_key(&scene.id);
+        let is_rendered = |scene: &SceneFile| has_photo(scene) || dataset.photo_renderer(scene).is_some();
         if format.needs_pictures() && !dataset.scenes.iter().all(is_rendered) {
             return Err(ExportError::NoPictures { path: root.to_owned() });
         }

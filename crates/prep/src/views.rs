@@ -10,7 +10,7 @@ use mateval_dataset::reference::{Emission, ReferenceScene, SurfaceIndex};
 use mateval_dataset::{Camera, ViewId};
 use mateval_files::FileError;
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::{LinearRgb, Mask, Normal, Picture, png_io};
+use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, png_io};
 use mateval_tracer::World;
 use mateval_tracer::aov::{PixelHit, PixelMean, appearance, flatness_values, hit_through, is_veiled, subpixel};
 use rayon::prelude::*;
@@ -239,6 +239,22 @@ fn glow_of_surfaces(reference: &ReferenceScene) -> Vec<Glow> {
 pub(crate) fn write_preview(folder: &Path, radiance: &Picture<LinearRgb>, exposure: f64) -> Result<(), PrepError> {
     let exposed = radiance.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
     Ok(png_io::write_srgb(&folder.join("rgb.png"), &exposed.to_srgb())?)
+}
+
+/// Reads a map of a view. Fails if it has not the size of the camera's picture.
+pub(crate) fn map_of<T: Copy>(
+    view: &View,
+    path: &Path,
+    read: fn(&Path) -> Result<Picture<T>, ImageError>,
+) -> Result<Picture<T>, PrepError> {
+    let map = read(path)?;
+    let k = view.camera.intrinsics;
+    let (expected, found) = ([k.width as usize, k.height as usize], [map.width(), map.height()]);
+    if found == expected {
+        return Ok(map);
+    }
+    let (picture, hint) = (format!("'{}'", path.display()), "; run `prep build` again");
+    Err(PrepError::PictureSize { picture, expected, found, hint })
 }
 
 /// What the pictures of all views show.

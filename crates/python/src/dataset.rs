@@ -1,6 +1,7 @@
 //! A dataset: scenes by their ids, with their instances, parts and views by theirs. The Python class `mateval.Dataset`
 //! makes it a mapping.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -31,7 +32,7 @@ impl Dataset {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let opened = py.detach(|| open::Dataset::open(&path).context("cannot open the dataset"));
-        Ok(Self(Arc::new(opened.map_err(failed)?)))
+        Ok(Self(Arc::new(opened.map_err(failed)?.with_twins())))
     }
 
     /// Its folder, as it was given.
@@ -68,6 +69,13 @@ impl Dataset {
     #[getter]
     fn absent(&self) -> Vec<&str> {
         self.0.absent.iter().map(|scene| scene.as_str()).collect()
+    }
+
+    /// By the id of each twin, the id of the scene that it shows and the name of its lighting.
+    #[getter]
+    fn twins(&self) -> BTreeMap<&str, (&str, String)> {
+        let twins = self.0.file.twins.iter();
+        twins.map(|(id, twin)| (id.as_str(), (twin.of.as_str(), twin.lighting.to_string()))).collect()
     }
 
     fn __len__(&self) -> usize {

@@ -52,7 +52,8 @@ pub fn publish(
     progress: Progress<'_>,
 ) -> Result<Published, ReportError> {
     // Everything that can fail.
-    let dataset = Dataset::open(root)?;
+    // Twins have files to withhold, too.
+    let dataset = Dataset::open(root)?.with_twins();
     dataset.check_whole()?;
     [public, private].into_iter().try_for_each(|out| check_holds_none(out, &[root]))?;
     let open = open_scenes(&dataset);

@@ -20,6 +20,8 @@ pub mod statistics;
 
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::layout::BuildFolder;
+
 /// The path of `file` in the shared data: in the folder that `MATEVAL_DATA` names, or in `../shared/data` from the
 /// repository's root. If it does not exist, reports this and returns none, or panics under
 /// `MATEVAL_REQUIRE_DATA=1`.
@@ -85,6 +87,18 @@ pub fn kept_folder(name: &str) -> PathBuf {
         }
     }
     tempfile::Builder::new().prefix(&format!("{name}-")).tempdir_in(root).unwrap().keep()
+}
+
+/// Makes the recipe of a build ask for these twins of every scene, in place of those that it asked for.
+pub fn want_twins(root: &Path, lightings: &str) {
+    let path = BuildFolder::of(root).recipe();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let lines: Vec<String> = text
+        .lines()
+        .filter(|line| !line.starts_with("twins = "))
+        .map(|line| line.replace("[[scene]]", &format!("[[scene]]\ntwins = [{lightings}]")))
+        .collect();
+    std::fs::write(&path, lines.join("\n")).unwrap();
 }
 
 /// Copies all files below `from`.

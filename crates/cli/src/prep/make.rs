@@ -496,7 +496,10 @@ impl FinishArgs {
         };
         let dataset = with_progress(finish).context("cannot finish the dataset")?;
         let photos = dataset.photo_renderer.map_or("without photos".to_owned(), |id| format!("photos by {id}"));
-        print(&format!("{}: {}, {photos}\n", self.dataset.display(), counted(dataset.scenes.len(), "scene")))?;
+        let twins = dataset.twins.len();
+        let scenes = counted(dataset.scenes.len() - twins, "scene");
+        let twins = if twins == 0 { String::new() } else { format!(" and {}", counted(twins, "twin")) };
+        print(&format!("{}: {scenes}{twins}, {photos}\n", self.dataset.display()))?;
         Ok(Outcome::Good)
     }
 }

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
+use crate::lighting::LightingName;
 use crate::material::MaterialParameter;
 
 /// The name of this version of the format.
@@ -31,8 +32,12 @@ pub struct DatasetFile {
     pub version: String,
     /// The program and version that made it, as in `mateval 0.1.0`.
     pub tool: String,
-    /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
+    /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`. Twins follow the scene that they show.
     pub scenes: Vec<SceneId>,
+    /// Those of its scenes that are twins: another scene under another light, from whose answers only constancy is
+    /// scored. Absent where there are none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub twins: BTreeMap<SceneId, Twin>,
     /// The renderer that made the input pictures (`input/rgb`); null until all scenes without a photo from elsewhere
     /// are rendered, and where all scenes have one.
     pub photo_renderer: Option<RendererId>,
@@ -47,6 +52,16 @@ pub struct DatasetFile {
     pub withheld: Option<Secrecy>,
     /// SHA-256 of MANIFEST.sha256, hex. The manifest holds every file but itself and this one.
     pub manifest_sha256: String,
+}
+
+/// What a twin shows.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Twin {
+    /// The scene with which it shares geometry, atlases and true maps.
+    pub of: SceneId,
+    /// The weights of that scene's light groups in its photo.
+    pub lighting: LightingName,
 }
 
 /// What it is worth that the ground truth of a dataset is withheld.

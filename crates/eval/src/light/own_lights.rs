@@ -1,7 +1,8 @@
 //! Predictions under the scene's own emitters, compared with R.
 
 use mateval_dataset::Camera;
-use mateval_image::{LinearRgb, Picture, png_io};
+use mateval_dataset::lighting::{LightingName, light_of, lightings, weighted};
+use mateval_image::{LUMINANCE, LinearRgb, Picture, png_io};
 use mateval_light::light_fit::FittedRadiances;
 use mateval_tracer::noise_filter::Surfaces;
 use mateval_tracer::{LightMix, ViewsRender, World};
@@ -9,8 +10,7 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, ViewGuide, corrected_quarter, difference};
-use crate::light::lighting::{LightingName, group_shares, light_of, lightings};
-use crate::light::reference::{StoredReference, weighted};
+use crate::light::reference::StoredReference;
 use crate::light::shared_paths::{QUARTERS, SharedPaths, ViewQuarters, batches, picture_of};
 use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
@@ -165,5 +165,46 @@ impl ViewGuides<'_> {
     pub(crate) fn differences(&self, quarters: ViewQuarters) -> Vec<LightDifference> {
         let views = quarters.par_iter().enumerate();
         views.map(|(view, quarters)| difference([0, 1, 2, 3].map(|at| &quarters[at]), &self.of(view))).collect()
+    }
+}
+
+/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its
+/// squared share of their luminance. With light samples divided in these proportions, the sum of the pictures'
+/// variances is least if the variance of a group's light follows the square of the light (Cochran, "Sampling
+/// techniques", section 5.5).
+fn group_shares(mixes: &[LightMix], sums: &[[f64; 3]]) -> Vec<f64> {
+    let mut squares = vec![0.0; sums.len()];
+    for mix in mixes {
+        let of_groups: Vec<f64> = sums.iter().zip(mix).map(|(sum, weight)| luminance_of(sum, weight)).collect();
+        let total: f64 = of_groups.iter().sum();
+        if total > 0.0 {
+            squares.iter_mut().zip(of_groups).for_each(|(square, light)| *square += (light / total).powi(2));
+        }
+    }
+    squares.into_iter().map(f64::sqrt).collect()
+}
+
+/// The luminance of a group's light under its weights.
+fn luminance_of(sum: &[f64; 3], weight: &[f64; 3]) -> f64 {
+    (0..3).map(|c| LUMINANCE[c] * sum[c] * weight[c]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A faint group that is once alone is sampled more often than its light in the other pictures would deserve.
+    #[test]
+    fn shares_follow_the_pictures() {
+        let sums = [[9.0; 3], [1.0; 3]];
+        let own = vec![[1.0; 3]; 2];
+        let shares = |mixes: &[LightMix]| {
+            let shares = group_shares(mixes, &sums);
+            shares[1] / shares[0]
+        };
+        assert!((shares(std::slice::from_ref(&own)) - 1.0 / 9.0).abs() < 1e-12);
+        let alone = vec![[0.0; 3], [10.0; 3]];
+        assert!((shares(&[own, alone]) - (1.01_f64.sqrt() / 0.9)).abs() < 1e-12);
+        assert_eq!(group_shares(&[vec![[0.0; 3]; 2]], &sums), [0.0; 2]);
     }
 }

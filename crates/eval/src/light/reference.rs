@@ -232,25 +232,10 @@ impl StoredReference {
     }
 }
 
-/// A picture under weighted light groups, exposed.
-pub(crate) fn weighted(
-    groups: &[Picture<LinearRgb>],
-    weights: &[[f64; 3]],
-    exposure: f64,
-    size: [usize; 2],
-) -> Picture<LinearRgb> {
-    let mut sums = vec![[0.0_f64; 3]; size[0] * size[1]];
-    for (group, weight) in groups.iter().zip(weights) {
-        for (sum, pixel) in sums.iter_mut().zip(group.pixels()) {
-            (0..3).for_each(|c| sum[c] += weight[c] * f64::from(pixel.0[c]));
-        }
-    }
-    Picture::from_fn(size[0], size[1], |x, y| LinearRgb(sums[y * size[0] + x].map(|v| (v * exposure) as f32)))
-}
-
 #[cfg(test)]
 mod tests {
     use mateval_dataset::layout::INPUT;
+    use mateval_dataset::lighting::weighted;
     use mateval_testkit::sample_dataset::dataset;
     use mateval_testkit::{copy_folder, kept_folder};
 

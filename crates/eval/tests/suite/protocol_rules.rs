@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
 use mateval_dataset::Camera;
+use mateval_dataset::lighting::lightings;
 use mateval_dataset::open::Dataset;
 use mateval_eval::EvalError;
-use mateval_eval::light::lighting::lightings;
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::protocol::Track;

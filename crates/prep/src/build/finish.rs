@@ -7,8 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use mateval_dataset::changes::{self, SceneHashes};
-use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
+use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile, Twin};
 use mateval_dataset::layout::{BuildFolder, DATASET, SceneFolder, TARGETS, is_input_picture, is_rendered};
+use mateval_dataset::lighting::parse_twin;
 use mateval_dataset::manifest;
 use mateval_dataset::open::{check_whole, read_dataset_file};
 use mateval_dataset::render_file::RENDER_FILE;
@@ -18,8 +19,9 @@ use mateval_files::whole::write_whole;
 use mateval_files::work_folder::remove;
 
 use super::start::{SceneMark, is_build, settings_sha256};
+use super::twins;
 use crate::error::PrepError;
-use crate::recipe::{self, RECIPE, Recipe};
+use crate::recipe::{self, RECIPE, Recipe, RecipeScene};
 use crate::render::run::{RendererKind, can_show_input, show_input};
 
 /// Pictures that a killed render wrote and that no list names yet.
@@ -82,6 +84,7 @@ fn finish_with(
         version: recipe.version.clone(),
         tool: tool.to_owned(),
         scenes,
+        twins: BTreeMap::new(),
         photo_renderer: None,
         licences: Vec::new(),
         geometry: None,
@@ -92,8 +95,9 @@ fn finish_with(
         dataset.licences.extend(json::read::<SceneMark>(&build.mark(id))?.licence);
         dataset.licences.extend(recipe.licence_of(id));
     }
-    let known = scene_hashes(root, &mut dataset, cut_off, progress)?;
     json::write(&root.join(TARGETS), &targets(root, &dataset)?)?;
+    let known = scene_hashes(root, &mut dataset, &wanted_twins(&recipe), cut_off, progress)?;
+    twins::remove_others(root, &all, &dataset.scenes)?;
     write_whole(&root.join(RECIPE), text.as_bytes())?;
     write(root, dataset, &known)
 }
@@ -105,8 +109,27 @@ pub fn finish_again(root: &Path, progress: Progress<'_>) -> Result<DatasetFile, 
     let _lease = BuildFolder::of(root).lease_of_whole(&dataset.scenes)?;
     changes::remove_unfinished(&root.join("scenes"))?;
     check_strays(root, &dataset.scenes)?;
-    let known = scene_hashes(root, &mut dataset, CutOffRenders::Refused, progress)?;
+    let twins = std::mem::take(&mut dataset.twins);
+    dataset.scenes.retain(|id| !twins.contains_key(id));
+    dataset.licences.retain(|licence| !twins.contains_key(&licence.scene));
+    // Without the recipe of the build, those that exist are wanted.
+    let wanted = match is_build(root) {
+        true => wanted_twins(&recipe::read(&BuildFolder::of(root).recipe())?.0),
+        false => twins.into_values().collect(),
+    };
+    let all = dataset.scenes.clone();
+    let known = scene_hashes(root, &mut dataset, &wanted, CutOffRenders::Refused, progress)?;
+    twins::remove_others(root, &all, &dataset.scenes)?;
     write(root, dataset, &known)
+}
+
+/// The twins that a recipe asks for, in its order.
+fn wanted_twins(recipe: &Recipe) -> Vec<Twin> {
+    let of = |entry: &RecipeScene| {
+        let of = entry.id.clone();
+        entry.twins.clone().into_iter().map(move |lighting| Twin { of: of.clone(), lighting })
+    };
+    recipe.scenes.iter().flat_map(of).collect()
 }
 
 /// Fails where a scene is not made, or was made otherwise than the recipe says.
@@ -159,18 +182,24 @@ pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepEr
     let folder = root.join("scenes");
     let entries = std::fs::read_dir(&folder).map_err(FileError::io("list", &folder))?;
     let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let is_stray =
-        |name: &String| !mateval_files::whole::is_temporary(name) && scenes.iter().all(|id| id.as_str() != name);
+    // Twins that a killed run has made are not listed yet.
+    let is_twin = |name: &str| parse_twin(name).is_some_and(|(of, _)| scenes.contains(&of));
+    let is_stray = |name: &String| {
+        let is_known = mateval_files::whole::is_temporary(name) || scenes.iter().any(|id| id.as_str() == name);
+        !is_known && !is_twin(name)
+    };
     let mut names: Vec<String> = names.filter(is_stray).collect();
     names.sort();
     if names.is_empty() { Ok(()) } else { Err(PrepError::StrayScenes { path: folder, names }) }
 }
 
-/// Checks the scenes' files, shows the photo renderer's picture in each, and returns the hashes of all files. Sets the
-/// photo renderer.
+/// Checks the scenes' files, shows the photo renderer's picture in each, makes the `wanted` twins of those that are
+/// rendered, and returns the hashes of all files. Sets the photo renderer, and lists the twins in the dataset, which has
+/// none before.
 fn scene_hashes(
     root: &Path,
     dataset: &mut DatasetFile,
+    wanted: &[Twin],
     cut_off: CutOffRenders,
     progress: Progress<'_>,
 ) -> Result<BTreeMap<String, String>, PrepError> {
@@ -195,14 +224,26 @@ fn scene_hashes(
     if !findings.is_empty() {
         return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
+    let mut twins = Vec::new();
     for (id, shown, list) in &mut lists {
-        if let Some(renderer) = shown {
-            list.note_change()?;
-            show_input(&SceneFolder::of(root, id), renderer)?;
+        let of_scene: Vec<Twin> = wanted.iter().filter(|twin| twin.of == **id).cloned().collect();
+        match shown {
+            Some(renderer) => {
+                list.note_change()?;
+                show_input(&SceneFolder::of(root, id), renderer)?;
+                twins.extend(twins::make(root, &of_scene, renderer, list, progress)?);
+            }
+            // Without renders, such as in the public part of a hidden split, those that exist stay as they are.
+            None => twins.extend(twins::keep(root, of_scene)?),
         }
         list.update()?;
     }
-    let entries = lists.iter().flat_map(|(_, _, list)| list.entries());
+    let mut lists: Vec<SceneHashes> = lists.into_iter().map(|(_, _, list)| list).collect();
+    for twin in twins {
+        let list = twins::list(root, dataset, twin)?;
+        lists.push(list);
+    }
+    let entries = lists.iter().flat_map(SceneHashes::entries);
     Ok(entries.map(|(file, sha256)| (file.to_owned(), sha256.to_owned())).collect())
 }
 

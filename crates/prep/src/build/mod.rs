@@ -5,8 +5,9 @@
 //! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one, converts the materials
 //! and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
 //! become a wrong truth; [`materials`] unwraps every instance and bakes its material ([`baking`]); meshes and
-//! `scene.json` are written here. [`finish`] writes the files of the whole
-//! dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a scene is refused.
+//! `scene.json` are written here. [`finish`] makes the `twins` of rendered scenes
+//! and writes the files of the whole dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a
+//! scene is refused.
 
 pub mod baking;
 pub mod fault;
@@ -20,6 +21,7 @@ mod plan;
 mod refusals;
 mod source;
 pub(crate) mod start;
+pub(crate) mod twins;
 pub mod upgrade;
 mod wide_views;
 
@@ -139,6 +141,8 @@ fn make_scene(
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
     let secret = secret.as_ref().map(Secret::fingerprint);
     let made = SceneMark { settings_sha256, licence, secret, absent, labels };
+    // Its twins show what it was.
+    twins::remove_others(&options.out, std::slice::from_ref(&entry.id), &[])?;
     work.finish()?;
     remove(&build.left_out(&entry.id))?;
     SceneHashes::empty(&options.out, &entry.id).update()?;

@@ -322,7 +322,9 @@ pub(crate) fn settings_sha256(recipe: &Recipe, id: &SceneId, tool: &str) -> Stri
         licences: _,
         scenes,
     } = recipe;
-    let entry = scenes.iter().find(|entry| entry.id == *id);
+    // Twins are made of a finished scene and change nothing in it.
+    let entry =
+        scenes.iter().find(|entry| entry.id == *id).cloned().map(|entry| RecipeScene { twins: Vec::new(), ..entry });
     let settings = format!(
         "{tool}\n{resolution:?}\n{views:?}\n{wide:?}\n{atlas_size:?}\n{materials:?}\n{camera_rules}\n{entry:?}"
     );

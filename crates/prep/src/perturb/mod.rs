@@ -55,6 +55,11 @@ pub fn perturb(
         let why = "has geometry that is perturbed already; start from the dataset with the true one";
         return Err(PrepError::unusable(root, why));
     }
+    if !dataset.file.twins.is_empty() {
+        let why =
+            "has twins, whose geometry is that of their scenes; start from a dataset that is built without `twins`";
+        return Err(PrepError::unusable(root, why));
+    }
     if let Some(scene) = dataset.scenes.iter().find(|scene| !dataset.folder(&scene.id).reference().is_dir()) {
         return Err(PrepError::NoTruth { scene: scene.id.clone() });
     }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::{SceneId, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::BelowError;
@@ -81,6 +82,11 @@ pub enum RecipeSceneFault {
     InputPath { file: String },
     #[error("`redress` changes the room, so that `photo` would show another; leave one of them out")]
     RedressedPhoto,
+    #[error("`twins` need light groups, and the light of a `photo` is not known; leave one of them out")]
+    PhotoTwins,
+    /// A scene has the id of a twin of another one.
+    #[error("it has the id of the twin '{lighting}' of scene '{of}'; choose another id")]
+    TwinId { of: SceneId, lighting: LightingName },
     /// The scene cannot be redressed.
     #[error(transparent)]
     Secret(#[from] SecretFault),

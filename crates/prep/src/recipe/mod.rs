@@ -10,7 +10,8 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use mateval_dataset::dataset::{Licence, TrueMaterials};
-use mateval_dataset::{SceneId, SourceKind, ViewId};
+use mateval_dataset::lighting::parse_twin;
+use mateval_dataset::{SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::untrusted::{hint, mistaken_for, read_at_most, without_mark};
 use mateval_sources::front3d::camera_rules::CameraRules;
@@ -18,7 +19,7 @@ use serde::Deserialize;
 
 use crate::error::PrepError;
 pub(crate) use fault::RESOLUTION;
-use fault::{RecipeFault, ValueFault, check_sizes};
+use fault::{RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
 pub(crate) use scene::SourcePath;
 pub use scene::{
     AppearanceWord, Availability, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource, Redress,
@@ -114,6 +115,12 @@ impl Recipe {
                 faults.push(RecipeFault::RepeatedScene { scene: scene.id.clone() });
             }
             scene.check(&mut faults);
+            if let Some((of, lighting)) = parse_twin(scene.id.as_str())
+                && self.scenes.iter().any(|other| other.id == of)
+            {
+                let fault = RecipeSceneFault::TwinId { of, lighting };
+                faults.push(RecipeFault::Scene { scene: scene.id.clone(), fault });
+            }
         }
         faults
     }

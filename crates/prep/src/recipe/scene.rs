@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::{PartSetId, SceneId, SourceKind};
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::shortened;
@@ -35,6 +36,9 @@ pub struct RecipeScene {
     /// Whether others have the files of the source.
     #[serde(default, rename = "source")]
     pub availability: Availability,
+    /// Lightings in which the scene is shown again, as scenes of which constancy is scored.
+    #[serde(default)]
+    pub twins: Vec<LightingName>,
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
     pub part_labels: BTreeMap<PartSetId, PathBuf>,
@@ -226,6 +230,7 @@ impl RecipeScene {
         if self.redress.is_some() && self.photo.is_some() {
             own.push(RecipeSceneFault::RedressedPhoto);
         }
+        self.check_twins(&mut own);
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             own.push(ValueFault::new("exposure", self.exposure.to_string(), "a number above 0").into());
         }
@@ -255,6 +260,23 @@ impl RecipeScene {
             (_, Some(_), _) => "the glTF's folder",
             (.., Some(_)) => "the .blend file's folder",
             _ => "the folder that the recipe's paths are relative to",
+        }
+    }
+
+    /// Twins need known light groups, ids, and each lighting once.
+    fn check_twins(&self, faults: &mut Vec<RecipeSceneFault>) {
+        if self.photo.is_some() && !self.twins.is_empty() {
+            faults.push(RecipeSceneFault::PhotoTwins);
+        }
+        for (at, lighting) in self.twins.iter().enumerate() {
+            if self.twins[..at].contains(lighting) {
+                faults.push(ValueFault::new("twins", format!("'{lighting}' twice"), "each lighting once").into());
+            }
+            if lighting.twin_of(&self.id).is_err() {
+                let expected =
+                    format!("an `id` of the scene that leaves space for '--{lighting}' within 64 characters");
+                faults.push(ValueFault::new("twins", format!("'{lighting}'"), expected).into());
+            }
         }
     }
 

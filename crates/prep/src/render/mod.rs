@@ -21,7 +21,7 @@ use mateval_dataset::open::{chosen_ids, read_dataset_file};
 use mateval_dataset::render_file::RenderNoise;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::{Progress, RendererId, Report, SceneId, json, reference};
-use mateval_image::{ImageError, Picture, exr_io, png_io};
+use mateval_image::{exr_io, png_io};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, RenderSettings, RenderStats, World, render_views};
 
@@ -31,6 +31,7 @@ use crate::build::finish::{check_strays, finish_again};
 use crate::build::start::is_build;
 use crate::error::PrepError;
 use crate::recipe::{self, RECIPE};
+use crate::views::map_of;
 pub use blender::BlenderOptions;
 pub use run::{MAX_BOUNCES, RenderReport, RendererKind};
 use run::{RenderRun, ViewRender, seed, seed_texts, write_view};
@@ -241,20 +242,4 @@ fn without_noise(folder: &SceneFolder, view: &View, [a, b]: [&LightPictures; 2])
         rgb: filtered_mean([&a.rgb, &b.rgb], &surfaces),
         groups: a.groups.iter().zip(&b.groups).map(|(a, b)| filtered_mean([a, b], &surfaces)).collect(),
     })
-}
-
-/// Reads a map of a view. Fails if it has not the size of the camera's picture.
-fn map_of<T: Copy>(
-    view: &View,
-    path: &Path,
-    read: fn(&Path) -> Result<Picture<T>, ImageError>,
-) -> Result<Picture<T>, PrepError> {
-    let map = read(path)?;
-    let k = view.camera.intrinsics;
-    let (expected, found) = ([k.width as usize, k.height as usize], [map.width(), map.height()]);
-    if found == expected {
-        return Ok(map);
-    }
-    let (picture, hint) = (format!("'{}'", path.display()), "; run `prep build` again");
-    Err(PrepError::PictureSize { picture, expected, found, hint })
 }

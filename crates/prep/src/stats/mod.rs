@@ -404,6 +404,7 @@ mod tests {
                 version: "1.0".to_owned(),
                 tool: String::new(),
                 scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
+                twins: BTreeMap::new(),
                 photo_renderer: None,
                 licences: Vec::new(),
                 geometry: None,
@@ -412,6 +413,7 @@ mod tests {
             },
             targets: TargetsFile { format: FORMAT.to_owned(), targets: Vec::new() },
             scenes,
+            twins: Vec::new(),
             absent: Vec::new(),
         }
     }

@@ -3,25 +3,25 @@
 mod pictures;
 mod renders;
 mod scene;
+mod twin;
 
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::scene_meshes;
 use crate::scene_meshes::Faults;
-use mateval_dataset::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
+use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::BuildFolder;
 use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::manifest::is_withheld;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::open::{absent_scenes, is_below, read_dataset_file};
-use mateval_dataset::{DatasetError, Finding, Progress, Report, SceneId, Severity, changes, json, manifest, reference};
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, changes, manifest, reference};
 use mateval_files::untrusted::sha256_of_file;
 use mateval_tracer::World;
-use serde::de::DeserializeOwned;
 
-use self::scene::{check_scene_file, check_schema};
+use self::scene::{check_scene_file, check_schema, read_json};
 use crate::error::PrepError;
 
 /// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound
@@ -60,24 +60,16 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepE
             progress(Report::part(&format!("scene {id}"), at, dataset.scenes.len()));
             let folder = SceneFolder::of(root, id);
             faults.prefix = format!("scenes/{id}/");
-            check_scene(root, &folder, dataset, id.as_str(), &mut faults);
+            match dataset.twins.get(id) {
+                Some(twin) => twin::check(root, id, twin, dataset, &mut faults),
+                None => check_scene(root, &folder, dataset, id.as_str(), &mut faults),
+            }
             faults.prefix.clear();
         }
         check_targets(root, dataset, &absent, &mut faults);
     }
     faults.all.sort();
     Ok(faults.all)
-}
-
-/// A file of the dataset; or none, after adding the reason why it could not be read.
-fn read_json<T: DeserializeOwned>(name: &str, path: &Path, faults: &mut Faults) -> Option<T> {
-    match json::read_format(path, FORMAT) {
-        Err(error @ DatasetError::Format { .. }) => {
-            faults.add("wrong_format", name, "/format", error.to_string());
-            None
-        }
-        read => faults.read(name, read),
-    }
 }
 
 fn check_manifest(root: &Path, absent: &[SceneId], faults: &mut Faults) {
@@ -108,6 +100,7 @@ fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
         // A missing manifest has been reported already.
         _ => {}
     }
+    twin::check_listed(dataset, faults);
     for (at, licence) in dataset.licences.iter().enumerate() {
         if !dataset.scenes.contains(&licence.scene) {
             let message = format!("the dataset has no scene '{}'", licence.scene);
@@ -119,7 +112,8 @@ fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
 fn check_targets(root: &Path, dataset: &DatasetFile, absent: &[SceneId], faults: &mut Faults) {
     let Some(file) = read_json::<TargetsFile>(TARGETS, &root.join(TARGETS), faults) else { return };
     let mut seen = std::collections::BTreeSet::new();
-    for scene in dataset.scenes.iter().filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
+    let scored = dataset.scenes.iter().filter(|id| !dataset.twins.contains_key(*id));
+    for scene in scored.filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
         faults.add("no_target", TARGETS, "/targets", format!("no view of scene '{scene}' is scored"));
     }
     for (at, target) in file.targets.iter().enumerate() {
@@ -130,6 +124,14 @@ fn check_targets(root: &Path, dataset: &DatasetFile, absent: &[SceneId], faults:
                 TARGETS,
                 &place,
                 format!("view '{}' of scene '{}' is listed twice", target.view, target.scene),
+            );
+        }
+        if dataset.twins.contains_key(&target.scene) {
+            faults.add(
+                "twin_target",
+                TARGETS,
+                &place,
+                format!("'{}' is a twin, of which no view is scored", target.scene),
             );
         }
         let view_exists =

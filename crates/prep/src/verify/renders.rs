@@ -188,6 +188,7 @@ mod tests {
             version: String::new(),
             tool: String::new(),
             scenes: vec![scene.id.clone()],
+            twins: BTreeMap::new(),
             photo_renderer: None,
             licences: Vec::new(),
             geometry: None,

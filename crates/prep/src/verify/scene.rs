@@ -8,16 +8,17 @@ use std::path::Path;
 use crate::scene_meshes::Faults;
 use crate::scene_meshes::Meshes;
 use glam::DMat3;
-use mateval_dataset::dataset::{Part, SceneFile, View, WideView};
+use mateval_dataset::dataset::{FORMAT, Part, SceneFile, View, WideView};
 use mateval_dataset::glb::GlbNode;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_dataset::submission::Map;
-use mateval_dataset::{Camera, ViewId};
+use mateval_dataset::{Camera, DatasetError, ViewId, json};
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
 use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 
 /// Checks `folder/file` against the schema of `T`. Every violation is a fault with its JSON pointer.
 pub(super) fn check_schema<T: JsonSchema>(folder: &Path, file: &str, faults: &mut Faults) {
@@ -30,6 +31,17 @@ pub(super) fn check_schema<T: JsonSchema>(folder: &Path, file: &str, faults: &mu
         // The message quotes the value, which may be long.
         let short: String = message.chars().take(300).collect();
         faults.add("breaks_schema", file, error.instance_path().to_string(), short);
+    }
+}
+
+/// A file of the dataset; or none, after adding the reason why it could not be read.
+pub(super) fn read_json<T: DeserializeOwned>(name: &str, path: &Path, faults: &mut Faults) -> Option<T> {
+    match json::read_format(path, FORMAT) {
+        Err(error @ DatasetError::Format { .. }) => {
+            faults.add("wrong_format", name, "/format", error.to_string());
+            None
+        }
+        read => faults.read(name, read),
     }
 }
 

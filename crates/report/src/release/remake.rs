@@ -64,13 +64,19 @@ impl Remake {
     }
 }
 
+/// Those that a recipe lists: twins come with their scenes.
+fn scenes(dataset: &Dataset) -> impl Iterator<Item = &str> {
+    let file = &dataset.file;
+    file.scenes.iter().filter(|id| !file.twins.contains_key(*id)).map(|id| id.as_str())
+}
+
 /// Scenes that were left out may be ones that cannot be built, so that the others are then named one by one.
 fn build_commands(dataset: &Dataset, left_out: &[&str]) -> Vec<String> {
     let whole = "mateval prep build recipe.toml --source SOURCE --out DATASET".to_owned();
     if left_out.is_empty() {
         return vec![whole];
     }
-    let scenes = options("scene", dataset.file.scenes.iter().map(|id| id.as_str()));
+    let scenes = options("scene", scenes(dataset));
     let without = options("without", left_out.iter().copied());
     vec![format!("{whole}{scenes}"), format!("mateval prep finish DATASET{without}")]
 }
@@ -79,7 +85,7 @@ fn build_commands(dataset: &Dataset, left_out: &[&str]) -> Vec<String> {
 fn render_command(with: &RenderedWith, recipe_samples: u32, dataset: &Dataset) -> String {
     let samples = with.samples_each_half;
     let samples = if samples == recipe_samples { String::new() } else { format!(" --samples {samples}") };
-    let is_whole = with.scenes.len() == dataset.file.scenes.len();
+    let is_whole = with.scenes.len() == scenes(dataset).count();
     let scenes = if is_whole { String::new() } else { options("scene", with.scenes.iter().map(|id| id.as_str())) };
     let finish = if is_whole { "" } else { " && mateval prep finish DATASET" };
     let reference = reference(dataset, &with.scenes);

@@ -112,9 +112,15 @@ pub(super) fn check(dataset: &Dataset, tree: &Tree) -> Vec<Finding> {
             _ => findings.extend(unexpected(name, kind)),
         }
     }
-    // A submission may cover scenes that were not downloaded, and need not.
-    let is_covered =
-        |id: &&SceneId| !dataset.absent.contains(id) || tree.kind(&joined("scenes", id.as_str())).is_some();
+    // A submission may cover scenes that were not downloaded, and twins, and need not.
+    let twins = &dataset.file.twins;
+    let exists = |id: &SceneId| tree.kind(&joined("scenes", id.as_str())).is_some();
+    let is_covered = |id: &&SceneId| exists(id) || !dataset.absent.contains(id) && !twins.contains_key(id);
+    for (id, twin) in twins.iter().filter(|(id, _)| !exists(id) && !dataset.absent.contains(id)) {
+        let message = format!("the folder of this twin of scene '{}' is missing", twin.of);
+        let action = "answer it from its own photo; without it constancy has no value";
+        findings.push(warning("missing_twin", &joined("scenes", id.as_str()), message, action));
+    }
     let known: Vec<&str> = dataset.file.scenes.iter().filter(is_covered).map(SceneId::as_str).collect();
     if tree.kind("scenes") != Some(Kind::Folder) {
         let message = "the folder 'scenes' is missing";

@@ -1,15 +1,41 @@
-//! Lightings: the scene's own emitters with weights that no method has seen, or radiances that were fitted.
+//! Lightings: a scene's own light groups with other weights. Light is linear, so a picture under a lighting is the
+//! weighted sum of the pictures under each group alone. Track `relit` and the photos of twins use them.
 
 use std::fmt;
 use std::str::FromStr;
 
-use mateval_dataset::by_text;
-use mateval_dataset::word_enum::UnknownWord;
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
-use mateval_tracer::LightMix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::protocol::RelitRules;
+use crate::by_text;
+use crate::ids::{BadId, SceneId};
+use crate::word_enum::UnknownWord;
+
+/// The rules by which the light groups of a scene are weighted. Groups are ordered by the luminance of the input view
+/// under each alone, over valid pixels, brightest first; groups that bring less than [`Self::least_share`] of it are
+/// left out of the order. Every lighting is then scaled so that the input view has the mean luminance that it has under
+/// the scene's own lights. Track `relit` measures luminance in R, twins in the photo.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RelitRules {
+    /// Lighting `warm_cool`: the weights of the first, third, ... group, by channel.
+    pub warm: [f64; 3],
+    /// Lighting `warm_cool`: the weights of the second, fourth, ... group.
+    pub cool: [f64; 3],
+    /// The number of lightings `alone_1`, `alone_2`, ..., in which one group has weight 1 and all others 0. Scenes of
+    /// one group have none.
+    pub alone_at_most: usize,
+    /// The smallest share of the light of a group that takes part.
+    pub least_share: f64,
+}
+
+impl RelitRules {
+    /// The rules of the protocols, with this number of lightings of one group.
+    pub const fn with_alone(alone_at_most: usize) -> Self {
+        Self { warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most, least_share: 0.05 }
+    }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -22,6 +48,8 @@ pub enum LightingName {
 
 const WARM_COOL: &str = "warm_cool";
 const ALONE: &str = "alone_";
+/// Between a scene's id and the lighting of its twin.
+const TWIN: &str = "--";
 
 impl fmt::Display for LightingName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -49,11 +77,24 @@ impl FromStr for LightingName {
 
 by_text!(LightingName, UnknownWord, "^(warm_cool|alone_[1-9][0-9]*)$");
 
+impl LightingName {
+    /// The id of a scene's twin under this lighting, as in `room--warm_cool`. Fails where that is too long for an id.
+    pub fn twin_of(self, scene: &SceneId) -> Result<SceneId, BadId> {
+        SceneId::new(format!("{scene}{TWIN}{self}"))
+    }
+}
+
+/// The scene and the lighting that the id of a twin consists of; absent if it is no such id.
+pub fn parse_twin(id: &str) -> Option<(SceneId, LightingName)> {
+    let (scene, lighting) = id.rsplit_once(TWIN)?;
+    Some((SceneId::new(scene).ok()?, lighting.parse().ok()?))
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelitLighting {
     pub name: LightingName,
     /// The weight of each light group and channel.
-    pub weights: LightMix,
+    pub weights: Vec<[f64; 3]>,
 }
 
 /// The lightings of a scene, by the rule of [`RelitRules`].
@@ -80,24 +121,8 @@ pub fn lightings(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<RelitLighting> {
     lightings
 }
 
-/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its
-/// squared share of their luminance. With light samples divided in these proportions, the sum of the pictures'
-/// variances is least if the variance of a group's light follows the square of the light (Cochran, "Sampling
-/// techniques", section 5.5).
-pub(crate) fn group_shares(mixes: &[LightMix], sums: &[[f64; 3]]) -> Vec<f64> {
-    let mut squares = vec![0.0; sums.len()];
-    for mix in mixes {
-        let of_groups: Vec<f64> = sums.iter().zip(mix).map(|(sum, weight)| weighted_luminance(sum, weight)).collect();
-        let total: f64 = of_groups.iter().sum();
-        if total > 0.0 {
-            squares.iter_mut().zip(of_groups).for_each(|(square, light)| *square += (light / total).powi(2));
-        }
-    }
-    squares.into_iter().map(f64::sqrt).collect()
-}
-
 /// Scales the weights so that the input view is as bright as under the scene's own lights.
-fn expose(weights: &mut LightMix, sums: &[[f64; 3]]) {
+fn expose(weights: &mut [[f64; 3]], sums: &[[f64; 3]]) {
     let own: f64 = sums.iter().map(|sum| luminance(*sum)).sum();
     let pairs = sums.iter().zip(weights.iter());
     let lit: f64 = pairs.map(|(sum, weight)| weighted_luminance(sum, weight)).sum();
@@ -114,10 +139,26 @@ fn by_brightness(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<usize> {
     order
 }
 
-/// The linear light of a light group in R's input view, summed over its valid pixels, by channel.
+/// The linear light of a light group in a picture of the input view, summed over its valid pixels, by channel.
 pub fn light_of(picture: &Picture<LinearRgb>, valid: &Mask) -> [f64; 3] {
     let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
     lit.fold([0.0; 3], |sum, (LinearRgb(rgb), _)| [0, 1, 2].map(|c| sum[c] + f64::from(rgb[c])))
+}
+
+/// A picture under weighted light groups, exposed.
+pub fn weighted(
+    groups: &[Picture<LinearRgb>],
+    weights: &[[f64; 3]],
+    exposure: f64,
+    size: [usize; 2],
+) -> Picture<LinearRgb> {
+    let mut sums = vec![[0.0_f64; 3]; size[0] * size[1]];
+    for (group, weight) in groups.iter().zip(weights) {
+        for (sum, pixel) in sums.iter_mut().zip(group.pixels()) {
+            (0..3).for_each(|c| sum[c] += weight[c] * f64::from(pixel.0[c]));
+        }
+    }
+    Picture::from_fn(size[0], size[1], |x, y| LinearRgb(sums[y * size[0] + x].map(|v| (v * exposure) as f32)))
 }
 
 fn weighted_luminance(sum: &[f64; 3], weight: &[f64; 3]) -> f64 {
@@ -130,17 +171,14 @@ fn luminance(rgb: [f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::protocol::Protocol;
-
     use super::*;
 
     fn flat(value: f32) -> Picture<LinearRgb> {
         Picture::filled(2, 1, LinearRgb([value; 3]))
     }
 
-    /// Those of the protocol, with the names that twins use besides.
     fn rules() -> RelitRules {
-        RelitRules { alone_at_most: 3, ..Protocol::named("mateval-3").unwrap().light.relit }
+        RelitRules::with_alone(3)
     }
 
     fn sums(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<[f64; 3]> {
@@ -167,8 +205,20 @@ mod tests {
         }
     }
 
+    #[test]
+    fn twins_are_named_after_scene_and_lighting() {
+        let room = SceneId::new("room--east").unwrap();
+        let twin = LightingName::Alone(2).twin_of(&room).unwrap();
+        assert_eq!(twin.as_str(), "room--east--alone_2");
+        assert_eq!(parse_twin(twin.as_str()), Some((room, LightingName::Alone(2))));
+        for other in ["room", "room--east", "room--alone_0", "--warm_cool", "room-warm_cool"] {
+            assert_eq!(parse_twin(other), None, "{other}");
+        }
+        assert!(LightingName::WarmCool.twin_of(&SceneId::new("a".repeat(54)).unwrap()).is_err());
+    }
+
     /// Weights divided by their first positive one: exposure scales all alike.
-    fn relative(lighting: &RelitLighting) -> LightMix {
+    fn relative(lighting: &RelitLighting) -> Vec<[f64; 3]> {
         let unit = lighting.weights.iter().flatten().copied().find(|weight| *weight > 0.0).unwrap();
         lighting.weights.iter().map(|rgb| rgb.map(|weight| weight / unit)).collect()
     }
@@ -219,20 +269,5 @@ mod tests {
         let groups = [flat(1.0), Picture::from_fn(2, 1, |x, _| LinearRgb([[9.0, 0.5][x]; 3]))];
         let valid = Mask::from_fn(2, 1, |x, _| x == 1);
         assert_eq!(relative(&lightings(&rules(), &sums(&groups, &valid))[1])[0], [1.0; 3]);
-    }
-
-    /// A faint group that is once alone is sampled more often than its light in the other pictures would deserve.
-    #[test]
-    fn shares_follow_the_pictures() {
-        let sums = [[9.0; 3], [1.0; 3]];
-        let own = vec![[1.0; 3]; 2];
-        let shares = |mixes: &[LightMix]| {
-            let shares = group_shares(mixes, &sums);
-            shares[1] / shares[0]
-        };
-        assert!((shares(std::slice::from_ref(&own)) - 1.0 / 9.0).abs() < 1e-12);
-        let alone = vec![[0.0; 3], [10.0; 3]];
-        assert!((shares(&[own, alone]) - (1.01_f64.sqrt() / 0.9)).abs() < 1e-12);
-        assert_eq!(group_shares(&[vec![[0.0; 3]; 2]], &sums), [0.0; 2]);
     }
 }
