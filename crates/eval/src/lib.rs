@@ -17,9 +17,12 @@
 //!    ([`light::fitted_lights`]).
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
+//! Of a scene with twins, [`constancy`] then compares the maps of scene and twins with each other.
+//!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
 //! ([`result::means`]): pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.
 
+pub mod constancy;
 pub mod error;
 pub mod fixed_rules;
 pub mod metric;

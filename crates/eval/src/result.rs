@@ -12,6 +12,7 @@ use mateval_light::light_fit::FittedRadiances;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::constancy::Constancy;
 use crate::metric::{Metric, PictureKind};
 use crate::protocol::Protocol;
 use crate::result::key::{PictureName, Region, ResultKey, Views};
@@ -39,6 +40,10 @@ pub struct ResultFile {
     pub lpips_weights: BTreeMap<String, Option<String>>,
     /// By name, the scores under each protocol.
     pub protocols: BTreeMap<String, ProtocolResult>,
+    /// How far the answers to a scene and to its twins lie apart, for each scored scene whose twins it answers; absent
+    /// where there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub constancy: Vec<Constancy>,
     /// Maps that the submission holds for no instance of any scored scene, by their words in its files. They have no
     /// values; under light they are the default.
     pub not_predicted: Vec<String>,

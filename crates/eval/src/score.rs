@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_dataset::changes;
 use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::verdict::{CompareCounts, VerdictFile};
@@ -17,6 +18,7 @@ use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::files::{HashedFile, SubmissionJson, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
+use crate::constancy::{Constancy, Family};
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::score_light;
@@ -76,12 +78,14 @@ struct Entry {
     files: Vec<HashedFile>,
     /// By protocol, scene by scene.
     scores: Vec<Vec<(SceneId, SceneScore)>>,
+    constancy: Vec<Constancy>,
 }
 
 struct Outcome {
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
     scores: Vec<SceneScore>,
+    constancy: Option<Constancy>,
 }
 
 /// Scores every submission and returns their results in the same order. The camera rays of a scene are traced once for
@@ -124,6 +128,7 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
         for (entry, outcome) in entries.iter_mut().zip(outcomes) {
             entry.findings.extend(outcome.findings);
             entry.files.extend(outcome.files);
+            entry.constancy.extend(outcome.constancy);
             for (scores, score) in entry.scores.iter_mut().zip(outcome.scores) {
                 scores.push((scene.id.clone(), score));
             }
@@ -167,22 +172,103 @@ fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) ->
     let atlases = AtlasMeshes::on_demand(plan.dataset, scene);
     let read = |path: &&Path| read_scene(path, scene, &atlases);
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(read).collect::<Result<_, _>>()?;
+    let mut open = None;
     let mut scores: Vec<Option<Vec<SceneScore>>> =
         predictions.iter().map(|p| plan.read_cached(scene, p).filter(|_| plan.pictures.is_none())).collect();
     let uncached: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
     if !uncached.is_empty() {
         let chosen: Vec<PredictedScene> = uncached.iter().map(|&at| predictions[at].clone()).collect();
-        for (&at, found) in uncached.iter().zip(plan.score_uncached(scene, &chosen, progress)?) {
+        let (found, opened) = plan.score_uncached(scene, &chosen, progress)?;
+        open = Some(opened);
+        for (&at, found) in uncached.iter().zip(found) {
             plan.write_cache(scene, &predictions[at], &found)?;
             scores[at] = Some(found);
         }
     }
-    let outcome = |(prediction, scores): (PredictedScene, Option<Vec<SceneScore>>)| Outcome {
-        findings: prediction.findings,
-        files: prediction.files,
-        scores: scores.expect("scores that were not cached have just been computed"),
-    };
-    Ok(predictions.into_iter().zip(scores).map(outcome).collect())
+    let mut outcomes = Vec::new();
+    for ((path, prediction), scores) in plan.submissions.iter().zip(predictions).zip(scores) {
+        // One family at a time: each member has as many maps as the scene.
+        let twins = Twins::read(plan, path, scene, &atlases)?;
+        let constancy = twins.constancy(plan, scene, &prediction, &mut open, progress)?;
+        let (mut findings, mut files) = (prediction.findings, prediction.files);
+        findings.extend(twins.findings);
+        files.extend(twins.answers.into_iter().flat_map(|(_, answer)| answer.files));
+        let scores = scores.expect("scores that were not cached have just been computed");
+        outcomes.push(Outcome { findings, files, scores, constancy });
+    }
+    Ok(outcomes)
+}
+
+/// The answers of a submission to the twins of a scene.
+struct Twins {
+    answers: Vec<(LightingName, PredictedScene)>,
+    findings: Vec<Finding>,
+}
+
+impl Twins {
+    /// `atlases` are the scene's, which its twins share.
+    fn read(
+        plan: &ScorePlan<'_>,
+        submission: &Path,
+        scene: &SceneFile,
+        atlases: &AtlasMeshes<'_>,
+    ) -> Result<Self, EvalError> {
+        let (mut answers, mut findings) = (Vec::new(), Vec::new());
+        for twin in plan.dataset.twins_of(&scene.id) {
+            let Some(shown) = plan.dataset.file.twins.get(&twin.id) else { continue };
+            let mut answer = read_scene(submission, twin, atlases)?;
+            if answer.files.is_empty() {
+                let message = format!("the submission holds no map of this twin of scene '{}'", scene.id);
+                let action = "constancy has no value in that scene; answer each twin from its own photo";
+                let file = format!("scenes/{}", twin.id);
+                findings.push(Finding::new(Severity::Note, "twin_not_predicted", file, "", message, action));
+            } else {
+                findings.append(&mut answer.findings);
+            }
+            answers.push((shown.lighting, answer));
+        }
+        Ok(Self { answers, findings })
+    }
+
+    /// All answers to the family. Absent where the scene has no twins, or where the submission holds no map of the scene
+    /// or of one of them.
+    fn members<'a>(&'a self, prediction: &'a PredictedScene) -> Option<Vec<&'a PredictedScene>> {
+        let answers = self.answers.iter().map(|(_, answer)| answer);
+        let members: Vec<&PredictedScene> = std::iter::once(prediction).chain(answers).collect();
+        (members.len() > 1 && members.iter().all(|member| !member.files.is_empty())).then_some(members)
+    }
+
+    /// What the cache holds of the scene; absent if it holds nothing that can be read.
+    fn cached(plan: &ScorePlan<'_>, scene: &SceneFile, members: &[&PredictedScene]) -> Option<Option<Constancy>> {
+        let (cache, key) = (Cache::new(plan.cache?), plan.family_key(scene, members));
+        json::parse(&cache.path(&key), &cache.read(&key, MOST_CACHED_BYTES).ok()??).ok()
+    }
+
+    /// Absent where there are no [`Self::members`]. The scene is opened if it is not yet.
+    fn constancy(
+        &self,
+        plan: &ScorePlan<'_>,
+        scene: &SceneFile,
+        prediction: &PredictedScene,
+        open: &mut Option<OpenScene>,
+        progress: Progress<'_>,
+    ) -> Result<Option<Constancy>, EvalError> {
+        let Some(members) = self.members(prediction) else { return Ok(None) };
+        if let Some(found) = Self::cached(plan, scene, &members) {
+            return Ok(found);
+        }
+        let key = plan.family_key(scene, &members);
+        let open = match open {
+            Some(open) => open,
+            none => none.insert(OpenScene::read(plan.dataset, scene)?),
+        };
+        let lightings = self.answers.iter().map(|(lighting, _)| *lighting).collect();
+        let found = Family { scene, lightings, members }.constancy(open, progress)?;
+        if let Some(cache) = plan.cache.map(Cache::new) {
+            cache.keep(&key, json::to_text(&found).as_bytes())?;
+        }
+        Ok(found)
+    }
 }
 
 impl<'a> ScorePlan<'a> {
@@ -224,8 +310,12 @@ impl<'a> ScorePlan<'a> {
         for path in &self.submissions {
             let mut of_submission = Vec::new();
             for scene in scenes {
-                let prediction = read_scene(path, scene, &AtlasMeshes::on_demand(self.dataset, scene))?;
-                if self.read_cached(scene, &prediction).is_none() {
+                let atlases = AtlasMeshes::on_demand(self.dataset, scene);
+                let prediction = read_scene(path, scene, &atlases)?;
+                let twins = Twins::read(self, path, scene, &atlases)?;
+                let is_unknown = |members: Vec<_>| Twins::cached(self, scene, &members).is_none();
+                if self.read_cached(scene, &prediction).is_none() || twins.members(&prediction).is_some_and(is_unknown)
+                {
                     of_submission.push(scene.id.clone());
                 }
             }
@@ -236,12 +326,13 @@ impl<'a> ScorePlan<'a> {
         if missing.is_empty() { Ok(()) } else { Err(EvalError::NotCached { missing }) }
     }
 
+    /// The scores, and the scene that was opened for them.
     fn score_uncached(
         &self,
         scene: &SceneFile,
         predictions: &[PredictedScene],
         progress: Progress<'_>,
-    ) -> Result<Vec<Vec<SceneScore>>, EvalError> {
+    ) -> Result<(Vec<Vec<SceneScore>>, OpenScene), EvalError> {
         let has = |track| self.protocols.iter().any(|protocol| protocol.light.tracks.contains(&track));
         let reference = if has(Track::True) { StoredReference::listed(self.dataset, scene)? } else { None };
         // A dataset that has references has them all: a scene without one would silently have no light.
@@ -259,19 +350,19 @@ impl<'a> ScorePlan<'a> {
             let folder = format!("ground_truth/renders/{renderer}/");
             self.dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?;
         }
-        let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene)?;
+        let open = OpenScene::read(self.dataset, scene)?;
         let folder_of = |root: &Path, at: usize| match self.submissions.len() {
             1 => root.to_owned(),
             _ => root.join(at.to_string()),
         };
         let folders = |root| (0..self.submissions.len()).map(|at| folder_of(root, at)).collect();
         let pictures = self.pictures.map(|root| PicturesDir { folders: folders(root) });
-        score_scene(&SceneTask {
+        let scores = score_scene(&SceneTask {
             dataset: &self.dataset.root,
             scene,
-            folder: &folder,
-            world: &world,
-            atlases: &atlases,
+            folder: &open.folder,
+            world: &open.world,
+            atlases: &open.atlases,
             views: scored_views(self.dataset, scene)?,
             set: ViewSet::Turned,
             predictions,
@@ -281,7 +372,15 @@ impl<'a> ScorePlan<'a> {
             renderer,
             pictures: pictures.as_ref(),
             progress,
-        })
+        })?;
+        Ok((scores, open))
+    }
+
+    /// The key of a scene's constancy: everything that it depends on.
+    fn family_key(&self, scene: &SceneFile, members: &[&PredictedScene]) -> Key {
+        let answers: Vec<_> = members.iter().map(|member| (&member.files, &member.findings)).collect();
+        let of = ("constancy", &self.tool, &self.dataset.file.manifest_sha256, &scene.id, answers);
+        Key::of(json::to_text(&of).as_bytes())
     }
 
     /// The key of a scene's scores under a protocol: everything that they depend on.
@@ -333,7 +432,8 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
             "scored nevertheless; make the submission again for this dataset",
         ));
     }
-    Ok(Entry { file, findings, files: vec![hashed], scores: vec![Vec::new(); plan.protocols.len()] })
+    let scores = vec![Vec::new(); plan.protocols.len()];
+    Ok(Entry { file, findings, files: vec![hashed], scores, constancy: Vec::new() })
 }
 
 fn finish(
@@ -392,6 +492,7 @@ fn finish(
         dataset: DatasetId::new(plan.dataset, scored.iter().copied()),
         lpips_weights: BTreeMap::from([(LPIPS_NET.name().to_owned(), weights.map(str::to_owned))]),
         protocols,
+        constancy: entry.constancy,
         not_predicted: not_predicted.iter().map(|map| map.stem().to_owned()).collect(),
         tracer_check,
         missing,

@@ -196,6 +196,16 @@ impl ResultFile {
                 return Some(Difference { place: format!("/protocols/{name}/{part}{rest}"), ..first });
             }
         }
+        let deviations = self.constancy.iter().enumerate().flat_map(|(at, family)| {
+            [("raw", &family.raw), ("aligned", &family.aligned)].map(|(name, deviation)| (at, name, deviation))
+        });
+        for (at, name, deviation) in deviations {
+            let (said, found) = (to_value(deviation.relative), to_value(deviation.guarded()));
+            if said != found {
+                let place = format!("/constancy/{at}/{name}/relative");
+                return Some(Difference { place, said: short(&said), found: short(&found) });
+            }
+        }
         None
     }
 }

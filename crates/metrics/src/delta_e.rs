@@ -42,12 +42,17 @@ pub fn delta_e(
         let row = y * width..(y + 1) * width;
         let pairs = prediction.pixels()[row.clone()].iter().zip(&reference.pixels()[row.clone()]);
         let counted = pairs.zip(&mask.pixels()[row]).filter(|&(_, &counts)| counts);
-        counted.map(|((&p, &r), _)| lab(p).difference(lab(r))).sum()
+        counted.map(|((&p, &r), _)| color_difference(p, r)).sum()
     };
     // Threads take whole rows and the rows' sums are added from the top, so the number of threads changes no bit.
     let rows: Vec<f64> = (0..mask.height()).into_par_iter().map(sum_of_row).collect();
     let count = pixel_count(mask);
     Ok((count > 0).then(|| rows.iter().sum::<f64>() / count as f64))
+}
+
+/// The CIEDE2000 difference of two colours, clipped to 0..1 and seen under D65.
+pub fn color_difference(a: LinearRgb, b: LinearRgb) -> f64 {
+    lab(a).difference(lab(b))
 }
 
 /// The colour in CIE Lab under D65.

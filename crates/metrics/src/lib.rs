@@ -23,7 +23,7 @@ pub mod mse;
 pub mod pixel;
 pub mod ssim;
 
-pub use delta_e::delta_e;
+pub use delta_e::{color_difference, delta_e};
 pub use flip::{flip, flip_map};
 pub use lpips::{Features, Lpips, Net};
 pub use mse::{Psnr, mae, mse};

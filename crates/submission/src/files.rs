@@ -147,7 +147,7 @@ pub struct HashedSubmission {
 pub struct HashedFiles {
     method: String,
     json: HashedFile,
-    /// The maps of each scene, in the dataset's order.
+    /// The maps of each scene with those of its twins, in the dataset's order.
     scenes: Vec<(SceneId, Vec<HashedFile>)>,
 }
 
@@ -156,7 +156,11 @@ impl HashedFiles {
     pub fn read(submission: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<Self, SubmissionError> {
         let json = SubmissionJson::read(submission)?;
         let chosen = dataset.chosen_scenes(scenes)?;
-        let scenes = chosen.into_iter().map(|scene| (scene.id.clone(), map_hashes(submission, scene))).collect();
+        let with_twins = |scene: &SceneFile| {
+            let all = std::iter::once(scene).chain(dataset.twins_of(&scene.id));
+            (scene.id.clone(), all.flat_map(|scene| map_hashes(submission, scene)).collect())
+        };
+        let scenes = chosen.into_iter().map(with_twins).collect();
         Ok(Self { method: json.file.method, json: json.hashed, scenes })
     }
 

@@ -21,7 +21,7 @@ use mateval_prep::render::{RenderOptions, render};
 use mateval_submission::texel_map::TexelMap;
 use mateval_tracer::World;
 
-use crate::kept_folder;
+use crate::{copy_folder, kept_folder, want_twins};
 
 /// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is
 /// fitted by a light stage.
@@ -33,6 +33,20 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     add_references(&out, 32);
     Dataset::open(&out).unwrap()
 });
+
+static TWINS: LazyLock<Dataset> = LazyLock::new(|| {
+    let root = kept_folder("twins").join("dataset");
+    copy_folder(&dataset().root, &root);
+    // The scenes are rendered: a recipe that asks for twins needs no more than to be finished again.
+    want_twins(&root, "\"warm_cool\", \"alone_1\", \"alone_2\"");
+    finish_again(&root, &|_| ()).unwrap();
+    Dataset::open(&root).unwrap().with_twins()
+});
+
+/// The dataset with three twins of each scene, listed among the scenes; tests must not write to it.
+pub fn twins() -> &'static Dataset {
+    &TWINS
+}
 
 /// Renders the scorer's references of a dataset.
 pub fn add_references(root: &Path, samples: u32) {

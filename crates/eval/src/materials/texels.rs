@@ -9,7 +9,7 @@
 
 use std::path::Path;
 
-use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::dataset::{Instance, SceneFile};
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::reference::SurfaceIndex;
 use mateval_dataset::submission::MAP_SIZES;
@@ -64,16 +64,7 @@ pub fn texture_space(
     let input = scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&scene.id))?;
     let mut compared = vec![Vec::new(); submissions.len()];
     for (at, instance) in scene.instances.iter().enumerate() {
-        let Some(atlas) = &instance.atlas else { continue };
-        let size = atlas.size as usize;
-        // The sizes that a submission may have bound the memory of the truth, too.
-        if !MAP_SIZES.contains(&size) {
-            return Err(EvalError::Unsound {
-                place: format!("'{}': instance '{}'", folder.scene_file().display(), instance.id),
-                expected: format!("an atlas of {} to {} texels a side", MAP_SIZES.start(), MAP_SIZES.end()),
-                found: size.to_string(),
-            });
-        }
+        let Some(size) = checked_size(folder, instance)? else { continue };
         progress(Report::step(&format!("texels of {}", scene.id), at, scene.instances.len()));
         let (map, truth) = rayon::join(
             || TexelMap::new(world, SurfaceIndex(at), &atlases[at], size, &input.camera),
@@ -96,6 +87,20 @@ pub fn texture_space(
         }
     }
     Ok(compared)
+}
+
+/// The texels a side of an instance's atlas; absent if it has none. The sizes that a submission may have bound the memory
+/// of the truth, too.
+pub(crate) fn checked_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>, EvalError> {
+    let Some(size) = instance.atlas.as_ref().map(|atlas| atlas.size as usize) else { return Ok(None) };
+    if MAP_SIZES.contains(&size) {
+        return Ok(Some(size));
+    }
+    Err(EvalError::Unsound {
+        place: format!("'{}': instance '{}'", folder.scene_file().display(), instance.id),
+        expected: format!("an atlas of {} to {} texels a side", MAP_SIZES.start(), MAP_SIZES.end()),
+        found: size.to_string(),
+    })
 }
 
 /// The squared errors of a prediction, weighted by area: of observed texels, then of unobserved ones.
@@ -139,7 +144,8 @@ fn write_texels(path: &Path, map: &TexelMap, prediction: &Texture, truth: &Textu
     Ok(exr_io::write_channels(path, size, size, names.into_iter().zip(planes).collect(), Precision::Float)?)
 }
 
-fn value(atlas_size: usize, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
+/// What a texture of any size holds at the place of a texel in row `y` of an atlas of `atlas_size` texels a side.
+pub(crate) fn value(atlas_size: usize, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
     match (texture.width(), texel.off_centre) {
         (1, _) => texture.texel(0, 0),
         (_, Some(uv)) => texture.sample(uv),

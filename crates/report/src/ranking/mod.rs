@@ -464,6 +464,7 @@ pub(crate) mod tests {
             },
             lpips_weights: BTreeMap::from([("alex".to_owned(), None)]),
             protocols: BTreeMap::from([("mateval-3".to_owned(), scores)]),
+            constancy: Vec::new(),
             not_predicted: Vec::new(),
             tracer_check: None,
             missing: Vec::new(),

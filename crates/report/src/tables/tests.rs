@@ -60,6 +60,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
         },
         lpips_weights: BTreeMap::new(),
         protocols: BTreeMap::from([("paper".to_owned(), scores)]),
+        constancy: Vec::new(),
         not_predicted: Vec::new(),
         tracer_check: None,
         missing: Vec::new(),

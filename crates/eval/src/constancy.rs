@@ -1,0 +1,398 @@
+//! Constancy: whether an answer stays the same when the light changes.
+//!
+//! A family is a scene and its twins, which show it under other weights of its light groups. Their true maps are the
+//! same, so that every difference between a method's answers is an error. In: the maps that a submission holds for the
+//! scene and for each twin. Out: [`Constancy`], over the texels that the input view shows, weighted by area.
+//!
+//! A constant answer is easily had: grey everywhere, or colours drawn towards grey. So the deviation is also divided by
+//! the answer's own contrast, in luminance and in colour apart. A copy of reduced saturation or contrast has the same
+//! quotient, and an answer without contrast has none. Beside it stands how far the family's mean is from the truth.
+//!
+//! Two passes over the texels: the means, from which the scales of aligned answers follow; then everything else.
+
+use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::lighting::LightingName;
+use mateval_dataset::reference::SurfaceIndex;
+use mateval_dataset::{Progress, Report, SceneId};
+use mateval_image::{LUMINANCE, LinearRgb, Texture};
+use mateval_metrics::color_difference;
+use mateval_submission::prediction::PredictedScene;
+use mateval_submission::texel_map::TexelMap;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::EvalError;
+use crate::materials::texels::{checked_size, value};
+use crate::metric::HALF_A_BYTE;
+use crate::open_scene::OpenScene;
+use crate::truth::true_material;
+
+/// The constancy of a submission's base colours in one family.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Constancy {
+    /// The scene that the family shows.
+    pub scene: SceneId,
+    /// The lightings of its twins.
+    pub lightings: Vec<LightingName>,
+    /// The area of the texels that the input view shows, in square metres.
+    pub area_m2: f64,
+    /// Of the base colours as they are.
+    pub raw: Deviation,
+    /// Of the base colours of each scene and twin after one scale a channel, which brings their mean to that of the
+    /// family.
+    pub aligned: Deviation,
+    /// The mean squared error of the family's mean of raw base colours, linear, mean over channels.
+    pub mean_mse: f64,
+    /// The mean CIEDE2000 difference of the family's mean of raw base colours from the truth.
+    pub mean_delta_e: f64,
+}
+
+/// How far the answers to a family lie from their mean. Root mean squares over texels, by area, and over the family.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Deviation {
+    /// Linear, also over channels.
+    pub linear: f64,
+    /// In CIEDE2000, of colours clipped to 0..1.
+    pub delta_e: f64,
+    /// Of the luminance.
+    pub luminance: Spread,
+    /// Of what remains of a colour without its luminance, also over channels.
+    pub chroma: Spread,
+    /// The deviations of luminance and of chroma, each divided by its contrast: their root mean square. Null where one
+    /// of both contrasts is at most 0.505/255, which counts as none.
+    pub relative: Option<f64>,
+}
+
+/// Of one part of the colours, linear.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Spread {
+    /// How far the answers to a family lie from their mean.
+    pub deviation: f64,
+    /// How far the texels of the family's mean lie from the mean of all its texels.
+    pub contrast: f64,
+}
+
+impl Deviation {
+    /// The value of [`Self::relative`].
+    pub(crate) fn guarded(&self) -> Option<f64> {
+        let has_contrast = [self.luminance, self.chroma].iter().all(|part| part.contrast > f64::from(HALF_A_BYTE));
+        let square = |part: Spread| (part.deviation / part.contrast).powi(2);
+        has_contrast.then(|| ((square(self.luminance) + square(self.chroma)) / 2.0).sqrt())
+    }
+}
+
+/// The means of a submission over its families.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConstancyMeans {
+    pub families: usize,
+    /// The number of families in which [`Self::relative`] has a value.
+    pub with_contrast: usize,
+    /// Raw, then aligned.
+    pub linear: [f64; 2],
+    /// Raw, then aligned.
+    pub delta_e: [f64; 2],
+    /// Raw, then aligned; the mean over the families that have a value.
+    pub relative: [Option<f64>; 2],
+    /// PSNR in dB of the families' means: the mean over families.
+    pub mean_psnr: f64,
+    pub mean_delta_e: f64,
+}
+
+impl ConstancyMeans {
+    /// Absent where there is no family.
+    pub fn of(families: &[Constancy]) -> Option<Self> {
+        let count = families.len();
+        let mean = |value: &dyn Fn(&Constancy) -> f64| families.iter().map(value).sum::<f64>() / count as f64;
+        let both = |value: fn(&Deviation) -> f64| [mean(&|f| value(&f.raw)), mean(&|f| value(&f.aligned))];
+        let relative = [|f: &Constancy| f.raw.relative, |f: &Constancy| f.aligned.relative].map(|of| {
+            let known: Vec<f64> = families.iter().filter_map(of).collect();
+            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+        });
+        let psnr = |f: &Constancy| mateval_metrics::Psnr::from_mse(f.mean_mse).map_or(0.0, |psnr| psnr.db);
+        (count > 0).then(|| Self {
+            families: count,
+            with_contrast: families.iter().filter(|family| family.raw.relative.is_some()).count(),
+            linear: both(|deviation| deviation.linear),
+            delta_e: both(|deviation| deviation.delta_e),
+            relative,
+            mean_psnr: mean(&psnr),
+            mean_delta_e: mean(&|family| family.mean_delta_e),
+        })
+    }
+}
+
+/// The answers to a family: those to the scene first, then those to its twins.
+pub(crate) struct Family<'a> {
+    pub(crate) scene: &'a SceneFile,
+    pub(crate) lightings: Vec<LightingName>,
+    pub(crate) members: Vec<&'a PredictedScene>,
+}
+
+impl Family<'_> {
+    /// Compares the answers. Absent where the input view shows no texel.
+    pub(crate) fn constancy(&self, open: &OpenScene, progress: Progress<'_>) -> Result<Option<Constancy>, EvalError> {
+        let mut means = Means::default();
+        self.each_instance(open, "means", progress, |map, answers, _| {
+            means.add(&sums_of_rows(map, |y| Means::of_row(map, answers, y)));
+        })?;
+        if means.area_m2 == 0.0 {
+            return Ok(None);
+        }
+        let unit = vec![[1.0; 3]; self.members.len()];
+        let passes = [unit, means.scales()];
+        let centre = means.of_family();
+        let mut sums = Sums::default();
+        self.each_instance(open, "deviations", progress, |map, answers, truth| {
+            sums.add(&sums_of_rows(map, |y| Sums::of_row(map, answers, truth, &passes, centre, y)));
+        })?;
+        let members = self.members.len() as f64;
+        let [raw, aligned] = sums.passes.map(|pass| pass.deviation(means.area_m2, members));
+        Ok(Some(Constancy {
+            scene: self.scene.id.clone(),
+            lightings: self.lightings.clone(),
+            area_m2: means.area_m2,
+            raw,
+            aligned,
+            mean_mse: sums.squared_error / means.area_m2,
+            mean_delta_e: sums.delta_e / means.area_m2,
+        }))
+    }
+
+    /// Calls `work` with the texels of each instance, the family's base colours and the true one.
+    fn each_instance(
+        &self,
+        open: &OpenScene,
+        step: &str,
+        progress: Progress<'_>,
+        mut work: impl FnMut(&TexelMap, &[&Texture], &Texture),
+    ) -> Result<(), EvalError> {
+        let input = self.scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&self.scene.id))?;
+        for (at, instance) in self.scene.instances.iter().enumerate() {
+            let Some(size) = checked_size(&open.folder, instance)? else { continue };
+            progress(Report::step(&format!("constancy of {}: {step}", self.scene.id), at, self.scene.instances.len()));
+            let map = TexelMap::new(&open.world, SurfaceIndex(at), &open.atlases[at], size, &input.camera);
+            let truth = true_material(&open.folder, &instance.id, size)?.base_color;
+            // Every answer has a material, if only the default, for an instance with an atlas.
+            let answers: Vec<&Texture> = self
+                .members
+                .iter()
+                .filter_map(|member| member.materials[at].as_ref().map(|material| &material.base_color))
+                .collect();
+            work(&map, &answers, &truth);
+        }
+        Ok(())
+    }
+}
+
+/// The sums of all rows from the top, so that the number of threads changes no bit.
+fn sums_of_rows<T: Send>(map: &TexelMap, row: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..map.size()).into_par_iter().map(row).collect()
+}
+
+/// Sums over texels, weighted by area.
+#[derive(Clone, Debug, Default)]
+struct Means {
+    area_m2: f64,
+    /// Of each answer, by channel.
+    colors: Vec<[f64; 3]>,
+}
+
+impl Means {
+    fn of_row(map: &TexelMap, answers: &[&Texture], y: usize) -> Self {
+        let mut sums = Self { area_m2: 0.0, colors: vec![[0.0; 3]; answers.len()] };
+        for texel in map.row(y).filter(|texel| texel.observed) {
+            sums.area_m2 += texel.area_m2;
+            for (sum, texture) in sums.colors.iter_mut().zip(answers) {
+                let color = value(map.size(), texture, &texel, y);
+                (0..3).for_each(|c| sum[c] += texel.area_m2 * f64::from(color[c]));
+            }
+        }
+        sums
+    }
+
+    fn add(&mut self, rows: &[Self]) {
+        for row in rows {
+            self.area_m2 += row.area_m2;
+            self.colors.resize(row.colors.len(), [0.0; 3]);
+            for (sum, color) in self.colors.iter_mut().zip(&row.colors) {
+                (0..3).for_each(|c| sum[c] += color[c]);
+            }
+        }
+    }
+
+    /// The mean of all texels of the family's mean.
+    fn of_family(&self) -> [f64; 3] {
+        let count = self.area_m2 * self.colors.len() as f64;
+        [0, 1, 2].map(|c| self.colors.iter().map(|color| color[c]).sum::<f64>() / count)
+    }
+
+    /// What brings the mean of each answer to that of the family; 1 where it is 0.
+    fn scales(&self) -> Vec<[f64; 3]> {
+        let mean = |c: usize| self.colors.iter().map(|color| color[c]).sum::<f64>() / self.colors.len() as f64;
+        let scale = |color: &[f64; 3], c: usize| if color[c] == 0.0 { 1.0 } else { mean(c) / color[c] };
+        self.colors.iter().map(|color| [0, 1, 2].map(|c| scale(color, c))).collect()
+    }
+}
+
+/// Sums over texels, weighted by area: of raw, then of aligned answers.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    passes: [PassSums; 2],
+    /// Of the raw mean against the truth, mean over channels.
+    squared_error: f64,
+    delta_e: f64,
+}
+
+/// Squares.
+#[derive(Clone, Copy, Debug, Default)]
+struct PassSums {
+    /// Over the family and channels.
+    linear: f64,
+    delta_e: f64,
+    /// Of deviations over the family, then of contrast.
+    luminance: [f64; 2],
+    chroma: [f64; 2],
+}
+
+impl PassSums {
+    fn deviation(&self, area_m2: f64, members: f64) -> Deviation {
+        let root = |sum: f64, count: f64| (sum / (area_m2 * count)).sqrt();
+        let spread = |[deviation, contrast]: [f64; 2], channels: f64| Spread {
+            deviation: root(deviation, members * channels),
+            contrast: root(contrast, channels),
+        };
+        let mut found = Deviation {
+            linear: root(self.linear, 3.0 * members),
+            delta_e: root(self.delta_e, members),
+            luminance: spread(self.luminance, 1.0),
+            chroma: spread(self.chroma, 3.0),
+            relative: None,
+        };
+        found.relative = found.guarded();
+        found
+    }
+}
+
+impl Sums {
+    fn of_row(
+        map: &TexelMap,
+        answers: &[&Texture],
+        truth: &Texture,
+        passes: &[Vec<[f64; 3]>; 2],
+        centre: [f64; 3],
+        y: usize,
+    ) -> Self {
+        let mut sums = Self::default();
+        for texel in map.row(y).filter(|texel| texel.observed) {
+            let area = texel.area_m2;
+            let colors: Vec<[f64; 3]> =
+                answers.iter().map(|texture| value(map.size(), texture, &texel, y).map(f64::from)).collect();
+            for (at, (pass, scales)) in sums.passes.iter_mut().zip(passes).enumerate() {
+                let scaled = || colors.iter().zip(scales).map(|(color, scale)| [0, 1, 2].map(|c| color[c] * scale[c]));
+                let mean = [0, 1, 2].map(|c| scaled().map(|color| color[c]).sum::<f64>() / answers.len() as f64);
+                for color in scaled() {
+                    let [luminance, chroma] = parts([0, 1, 2].map(|c| color[c] - mean[c]));
+                    pass.linear += area * (0..3).map(|c| (color[c] - mean[c]).powi(2)).sum::<f64>();
+                    pass.delta_e += area * color_difference(shown(color), shown(mean)).powi(2);
+                    pass.luminance[0] += area * luminance;
+                    pass.chroma[0] += area * chroma;
+                }
+                let [luminance, chroma] = parts([0, 1, 2].map(|c| mean[c] - centre[c]));
+                pass.luminance[1] += area * luminance;
+                pass.chroma[1] += area * chroma;
+                if at == 0 {
+                    let truth = value(map.size(), truth, &texel, y).map(f64::from);
+                    sums.squared_error += area * (0..3).map(|c| (mean[c] - truth[c]).powi(2)).sum::<f64>() / 3.0;
+                    sums.delta_e += area * color_difference(shown(mean), shown(truth));
+                }
+            }
+        }
+        sums
+    }
+
+    fn add(&mut self, rows: &[Self]) {
+        for row in rows {
+            for (pass, more) in self.passes.iter_mut().zip(&row.passes) {
+                pass.linear += more.linear;
+                pass.delta_e += more.delta_e;
+                for at in 0..2 {
+                    pass.luminance[at] += more.luminance[at];
+                    pass.chroma[at] += more.chroma[at];
+                }
+            }
+            self.squared_error += row.squared_error;
+            self.delta_e += row.delta_e;
+        }
+    }
+}
+
+/// The squares of the luminance of a difference of colours, and of what remains of it, summed over channels.
+fn parts(difference: [f64; 3]) -> [f64; 2] {
+    let luminance: f64 = LUMINANCE.iter().zip(difference).map(|(weight, value)| weight * value).sum();
+    [luminance * luminance, difference.iter().map(|value| (value - luminance).powi(2)).sum()]
+}
+
+fn shown(color: [f64; 3]) -> LinearRgb {
+    LinearRgb(color.map(|value| value as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spread(deviation: f64, contrast: f64) -> Spread {
+        Spread { deviation, contrast }
+    }
+
+    /// Half the luminance's contrast and a tenth of the chroma's, by hand; without one of both contrasts no value.
+    #[test]
+    fn the_guard_is_relative_to_contrast() {
+        let of = |luminance, chroma| Deviation { luminance, chroma, ..Deviation::default() }.guarded();
+        let found = of(spread(0.1, 0.2), spread(0.01, 0.1)).unwrap();
+        assert!((found - (0.26_f64 / 2.0).sqrt()).abs() < 1e-12, "{found}");
+        assert_eq!(of(spread(0.0, 0.2), spread(0.0, 0.1)), Some(0.0));
+        assert_eq!(of(spread(0.0, 0.0), spread(0.0, 0.1)), None);
+        assert_eq!(of(spread(0.1, 0.2), spread(0.0, 0.001)), None);
+    }
+
+    /// Any colour is its luminance and the rest, whose luminance is 0; drawing it towards grey scales the rest alone.
+    #[test]
+    fn saturation_scales_chroma_alone() {
+        let color = [0.7, 0.2, 0.4];
+        let luminance: f64 = LUMINANCE.iter().zip(color).map(|(weight, value)| weight * value).sum();
+        let half = color.map(|value| luminance + (value - luminance) / 2.0);
+        let ([l, c], [l_half, c_half]) = (parts(color), parts(half));
+        assert!((l - l_half).abs() < 1e-15 && (c / 4.0 - c_half).abs() < 1e-15);
+        assert!(parts([0.3; 3])[1] < 1e-30);
+    }
+
+    /// Two answers of which one is twice the other: aligned, both are their mean.
+    #[test]
+    fn scales_bring_answers_to_the_mean_of_the_family() {
+        let means = Means { area_m2: 2.0, colors: vec![[0.4, 0.2, 0.0], [0.8, 0.4, 0.0]] };
+        assert_eq!(means.scales(), [[1.5, 1.5, 1.0], [0.75, 0.75, 1.0]].map(|row| row.map(|v: f64| v)));
+    }
+
+    #[test]
+    fn means_over_families_skip_what_has_no_value() {
+        let family = |relative, mse| Constancy {
+            scene: SceneId::new("s").unwrap(),
+            lightings: vec![LightingName::WarmCool],
+            area_m2: 1.0,
+            raw: Deviation { linear: 0.2, relative, ..Deviation::default() },
+            aligned: Deviation { linear: 0.1, ..Deviation::default() },
+            mean_mse: mse,
+            mean_delta_e: 3.0,
+        };
+        let found = ConstancyMeans::of(&[family(Some(0.5), 0.1), family(None, 0.001)]).unwrap();
+        assert_eq!((found.families, found.with_contrast), (2, 1));
+        assert_eq!((found.relative, found.linear), ([Some(0.5), None], [0.2, 0.1]));
+        assert!((found.mean_psnr - 20.0).abs() < 1e-12);
+        assert_eq!(ConstancyMeans::of(&[]), None);
+    }
+}
