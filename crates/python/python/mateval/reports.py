@@ -99,6 +99,11 @@ class Result(Mapping[str, float]):
         return list(self._file["not_predicted"])
 
     @property
+    def constancy(self) -> dict[str, dict[str, Any]]:
+        """By scene whose twins the submission answers, how far its answers lie apart: ``raw``, ``aligned``, ``mean_mse``..."""
+        return {family["scene"]: family for family in self._file.get("constancy", [])}
+
+    @property
     def missing(self) -> list[dict[str, Any]]:
         """Metrics that could not be computed: ``metric``, ``reason``, and the command to ``fix`` it."""
         return list(self._file["missing"])

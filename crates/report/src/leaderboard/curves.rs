@@ -1,5 +1,6 @@
-//! Pages of curves, a line for each method and the same numbers as a table: how scores fall in views from other places
-//! than the input view's, and the more the geometry that a method is given differs from the true one.
+//! Pages of charts, a series for each method and the same numbers as a table: how scores fall in views from other places
+//! than the input view's, and the more the geometry that a method is given differs from the true one; and how accurate
+//! methods are against how far their answers move with the light.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,6 +8,7 @@ use mateval_dataset::dataset::PerturbationKind;
 use mateval_dataset::dataset::WideView;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::{SceneId, ViewId};
+use mateval_eval::constancy::ConstancyMeans;
 use mateval_eval::metric::Metric;
 use mateval_eval::result::PictureValues;
 use mateval_eval::result::key::PictureName;
@@ -81,6 +83,45 @@ pub(super) fn write_perturbed(board: &Board<'_>, site: &SiteWriter<'_>) -> Resul
         title: "Imperfect geometry",
         scripts: &[],
         values: context! { sections => Serde(&sections) },
+    })
+}
+
+pub(super) fn has_constancy(board: &Board<'_>) -> bool {
+    board.results.iter().chain(board.ceiling).any(|result| !result.constancy.is_empty())
+}
+
+/// Writes the page, if any result has constancy.
+pub(super) fn write_constancy(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    if !has_constancy(board) {
+        return Ok(());
+    }
+    let listed = board.best_first().into_iter().map(|at| (board.heads[at].name.as_str(), &board.results[at]));
+    let ceiling = board.ceiling.map(|result| (result.method.as_str(), result));
+    let means: Vec<(&str, ConstancyMeans)> = listed
+        .chain(ceiling)
+        .filter_map(|(name, result)| Some((name, ConstancyMeans::of(&result.constancy)?)))
+        .collect();
+    let chart = |(title, at): (&str, usize)| {
+        let points: Vec<Point<'_>> =
+            means.iter().map(|(name, means)| (*name, means.mean_psnr, means.relative[at])).collect();
+        let cells = |(_, means): &(&str, ConstancyMeans)| {
+            let relative = means.relative[at].map(|value| format!("{value:.3}"));
+            let linear = format!("{:.4}", means.linear[at]);
+            let delta_e = Metric::DeltaE.style().text(means.delta_e[at]);
+            vec![Some(Metric::Psnr.style().text(means.mean_psnr)), relative, Some(linear), Some(delta_e)]
+        };
+        Chart::of_points(title.to_owned(), &points, means.iter().map(cells).collect())
+    };
+    let charts = [("As answered", 0), ("Aligned", 1)].map(chart);
+    let sections =
+        [Section { title: "Accuracy against deviation".to_owned(), charts: charts.into_iter().flatten().collect() }];
+    let families = board.results.iter().chain(board.ceiling).map(|result| result.constancy.len()).max();
+    site.page(&Page {
+        file: "constancy.html",
+        template: "constancy.j2",
+        title: "Constancy",
+        scripts: &[],
+        values: context! { sections => Serde(&sections), families },
     })
 }
 
@@ -202,10 +243,12 @@ fn class_title(axis: Axis, class: u32) -> String {
 #[derive(Debug, PartialEq, Serialize)]
 struct Chart {
     title: String,
-    /// The classes of values, from left to right.
+    /// The classes of values, from left to right; of points the least and the largest accuracy.
     classes: Vec<String>,
     /// The place of each class, in units of the chart.
     columns: Vec<f64>,
+    /// The heads of the columns of the table.
+    heads: Vec<String>,
     /// The places of the top and bottom lines, and their values.
     scale: [(f64, String); 2],
     lines: Vec<Line>,
@@ -221,6 +264,9 @@ struct Line {
     /// The values of all classes.
     cells: Vec<Option<String>>,
 }
+
+/// A method's accuracy in dB, and how far its answers deviate; absent where its answers have no contrast.
+type Point<'a> = (&'a str, f64, Option<f64>);
 
 /// The values of a method by class; lines have the classes' numbers as their places.
 type Values<'a> = (&'a str, BTreeMap<u32, f64>);
@@ -262,12 +308,47 @@ impl Chart {
                 cells: classes.iter().map(|class| Some(text(*values.get(class)?))).collect(),
             }
         };
+        let titles: Vec<String> = classes.iter().map(|class| class_title(*class)).collect();
         Some(Self {
             title,
-            classes: classes.iter().map(|class| class_title(*class)).collect(),
+            heads: titles.clone(),
+            classes: titles,
             columns: classes.iter().map(|class| column(*class)).collect(),
             scale: [high, low].map(|value| (row(value), text(value))),
             lines: methods.iter().map(line).collect(),
+        })
+    }
+}
+
+impl Chart {
+    /// A point for each method, more accurate ones on the right and more constant ones at the bottom; those without a
+    /// deviation are in the table alone. None where there are no two points to compare.
+    fn of_points(title: String, points: &[Point<'_>], cells: Vec<Vec<Option<String>>>) -> Option<Self> {
+        let placed = || points.iter().filter_map(|(_, x, y)| Some((*x, (*y)?)));
+        if placed().count() < 2 {
+            return None;
+        }
+        let range = |values: &dyn Fn((f64, f64)) -> f64| {
+            placed().map(values).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+        };
+        let ([left, right], [low, high]) = (range(&|(x, _)| x), range(&|(_, y)| y));
+        let share = |value: f64, low: f64, high: f64| if high > low { (value - low) / (high - low) } else { 0.5 };
+        let [width, height] = SIZE;
+        let column = |x: f64| rounded(MARGIN[0] + share(x, left, right) * (width - 2.0 * MARGIN[0]));
+        let row = |y: f64| rounded(height - MARGIN[1] - share(y, low, high) * (height - 2.0 * MARGIN[1]));
+        let line = |((name, x, y), cells): (&Point<'_>, Vec<Option<String>>)| Line {
+            name: (*name).to_owned(),
+            points: String::new(),
+            dots: y.iter().map(|y| [column(*x), row(*y)]).collect(),
+            cells,
+        };
+        Some(Self {
+            title,
+            classes: [left, right].map(|x| format!("{} dB", Metric::Psnr.style().text(x))).into(),
+            columns: [left, right].map(column).into(),
+            heads: ["PSNR of the mean", "Relative deviation", "RMS deviation", "CIEDE2000"].map(str::to_owned).into(),
+            scale: [high, low].map(|y| (row(y), format!("{y:.3}"))),
+            lines: points.iter().zip(cells).map(line).collect(),
         })
     }
 }
@@ -310,6 +391,21 @@ mod tests {
         assert_eq!(chart.scale, [(MARGIN[1], "30.0".to_owned()), (height - MARGIN[1], "10.0".to_owned())]);
         let one = [("a", BTreeMap::from([(2, 30.0)]))];
         assert_eq!(Chart::new("t".to_owned(), |class| class.to_string(), &one, 1.0, |v| v.to_string()), None);
+    }
+
+    /// The best of both lies at the bottom right; what has no deviation has no point, but a row.
+    #[test]
+    fn points_are_placed_by_both_numbers() {
+        let cells = |count: usize| vec![vec![Some("1".to_owned())]; count];
+        let points = [("gt", 60.0, Some(0.0)), ("nn", 20.0, Some(0.5)), ("grey", 15.0, None)];
+        let chart = Chart::of_points("t".to_owned(), &points, cells(3)).unwrap();
+        let [width, height] = SIZE;
+        assert_eq!(chart.lines[0].dots, [[width - MARGIN[0], height - MARGIN[1]]]);
+        assert_eq!(chart.lines[1].dots, [[MARGIN[0], MARGIN[1]]]);
+        assert!(chart.lines[2].dots.is_empty() && chart.lines[2].cells.len() == 1);
+        assert_eq!(chart.classes, ["20.00 dB", "60.00 dB"]);
+        let one = [("gt", 60.0, Some(0.0)), ("grey", 15.0, None)];
+        assert_eq!(Chart::of_points("t".to_owned(), &one, cells(2)), None);
     }
 
     fn value(view: &str, number: f64) -> PictureValues {

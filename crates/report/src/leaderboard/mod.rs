@@ -34,7 +34,7 @@ use mateval_files::work_folder::{WorkFolder, check_free};
 use self::board::Board;
 pub use self::entries::{LeaderboardPlan, Submissions};
 use self::file::LEADERBOARD_PATH;
-use self::site::{PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
+use self::site::{CONSTANCY, PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
@@ -70,6 +70,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     scene_page::write_rooms(&board, &site)?;
     curves::write_wide_views(&board, &site)?;
     curves::write_perturbed(&board, &site)?;
+    curves::write_constancy(&board, &site)?;
     robustness::write(&board, &site)?;
     if plan.votes {
         votes_page::write(&board, &site)?;
@@ -104,6 +105,7 @@ fn site(board: &Board<'_>, votes: bool) -> Site {
             .into_iter()
             .chain(curves::has_wide_views(board).then_some(WIDE_VIEWS))
             .chain(curves::has_perturbed(board).then_some(PERTURBED))
+            .chain(curves::has_constancy(board).then_some(CONSTANCY))
             .chain(robustness::has_page(board).then_some(ROBUSTNESS))
             .chain(votes.then_some(VOTES))
             .collect(),
@@ -116,6 +118,7 @@ mod tests {
 
     use mateval_dataset::json;
     use mateval_dataset::submission::Cost;
+    use mateval_eval::constancy::{Constancy, Deviation};
     use mateval_eval::result::{ResultFile, TracerCheck};
     use mateval_image::{Picture, png_io};
 
@@ -242,6 +245,40 @@ mod tests {
         assert_eq!(ids, ["good", "b-bold-b"]);
         assert_eq!(data["fingerprint"], results[0].protocols["mateval-3"].fingerprint);
         assert!(std::fs::read_to_string(out.join("index.html")).unwrap().contains("votes.html"));
+    }
+
+    /// Its page and table exist only where a method answers twins; a method without contrast has a row and no point.
+    #[test]
+    fn constancy_has_a_page_where_methods_answer_twins() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut results = three();
+        let site = |results: &[ResultFile], name: &str| {
+            let out = folder.path().join(name);
+            write(&plan(results), &out, false, &quiet).unwrap();
+            let [index, tables] =
+                ["index.html", "downloads/tables.csv"].map(|file| std::fs::read_to_string(out.join(file)).unwrap());
+            (std::fs::read_to_string(out.join("constancy.html")).ok(), index, tables)
+        };
+        let (page, index, tables) = site(&results, "without");
+        assert!(page.is_none() && !index.contains("constancy.html") && !tables.contains("Constancy"));
+        for (result, relative) in results.iter_mut().zip([Some(0.125), Some(0.5), None]) {
+            let deviation = Deviation { linear: 0.01, relative, ..Deviation::default() };
+            result.constancy = vec![Constancy {
+                scene: result.dataset.scenes[0].clone(),
+                lightings: vec!["warm_cool".parse().unwrap()],
+                area_m2: 1.0,
+                raw: deviation.clone(),
+                aligned: deviation,
+                mean_mse: 0.01,
+                mean_delta_e: 5.0,
+            }];
+        }
+        let (page, index, tables) = site(&results, "with");
+        let page = page.unwrap();
+        // Two charts of two points each, three rows each.
+        assert_eq!((page.matches("r=\"3\"").count(), page.matches("<tr><th scope=\"row\"").count()), (4, 6), "{page}");
+        assert!(page.contains("0.125") && page.contains("1 scene is shown again"), "{page}");
+        assert!(index.contains("constancy.html") && tables.contains("Constancy"), "{tables}");
     }
 
     #[test]

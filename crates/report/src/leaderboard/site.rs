@@ -21,7 +21,7 @@ const ASSETS: [(&str, &str); 6] = [
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 15] = [
+const TEMPLATES: [(&str, &str); 16] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
     ("board.j2", include_str!("templates/board.j2")),
@@ -35,6 +35,7 @@ const TEMPLATES: [(&str, &str); 15] = [
     ("errata.j2", include_str!("templates/errata.j2")),
     ("wide_views.j2", include_str!("templates/wide_views.j2")),
     ("perturbed.j2", include_str!("templates/perturbed.j2")),
+    ("constancy.j2", include_str!("templates/constancy.j2")),
     ("robustness.j2", include_str!("templates/robustness.j2")),
     ("votes.j2", include_str!("templates/votes.j2")),
 ];
@@ -78,6 +79,9 @@ pub(super) const WIDE_VIEWS: PageLink = PageLink { file: "wide_views.html", titl
 
 /// The entry of a site with submissions that were made from perturbed geometry.
 pub(super) const PERTURBED: PageLink = PageLink { file: "perturbed.html", title: "Imperfect geometry" };
+
+/// The entry of a site whose dataset has twins that methods answer.
+pub(super) const CONSTANCY: PageLink = PageLink { file: "constancy.html", title: "Constancy" };
 
 /// The entry of a site with methods to compare.
 pub(super) const ROBUSTNESS: PageLink = PageLink { file: "robustness.html", title: "Robustness" };

@@ -1,5 +1,6 @@
 //! The tables and their columns, and the numbers that cells can hold.
 
+use mateval_eval::constancy::{Constancy, ConstancyMeans};
 use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 
@@ -24,6 +25,70 @@ pub(crate) enum Quantity {
     /// The number of compared pixels.
     Pixels,
     Score(Metric),
+    Constancy(ConstancyNumber),
+}
+
+/// A mean over families of scenes and their twins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum ConstancyNumber {
+    /// The deviation relative to the answer's own contrast.
+    Relative,
+    Linear,
+    DeltaE,
+    /// Of the family's mean.
+    MeanPsnr,
+    MeanDeltaE,
+}
+
+impl ConstancyNumber {
+    const DEVIATIONS: [Self; 3] = [Self::Relative, Self::Linear, Self::DeltaE];
+    const ACCURACY: [Self; 2] = [Self::MeanPsnr, Self::MeanDeltaE];
+
+    fn style(self) -> NumberStyle {
+        match self {
+            Self::Relative => NumberStyle { title: "Relative", scale: 1.0, digits: 3 },
+            Self::Linear => NumberStyle { title: "RMS 1e-3", scale: 1e3, digits: 1 },
+            Self::DeltaE | Self::MeanDeltaE => Metric::DeltaE.style(),
+            Self::MeanPsnr => Metric::Psnr.style(),
+        }
+    }
+}
+
+/// The columns of constancy: title, whether answers are aligned, and numbers.
+const CONSTANCY: [(&str, PictureKind, &[ConstancyNumber]); 3] = [
+    ("Deviation", PictureKind::TextureBaseColor, &ConstancyNumber::DEVIATIONS),
+    ("Aligned deviation", PictureKind::AlbedoAligned, &ConstancyNumber::DEVIATIONS),
+    ("Mean answer", PictureKind::TextureBaseColor, &ConstancyNumber::ACCURACY),
+];
+
+/// The numbers of constancy, as the cells of [`constancy`] name them.
+pub(super) fn constancy_values(families: &[Constancy]) -> Vec<(CellKey, f64)> {
+    let Some(means) = ConstancyMeans::of(families) else { return Vec::new() };
+    let cell = |kind, number| CellKey {
+        picture: PictureName::whole(kind),
+        views: Views::Observed,
+        quantity: Quantity::Constancy(number),
+    };
+    let mut values = Vec::new();
+    for (at, kind) in [PictureKind::TextureBaseColor, PictureKind::AlbedoAligned].into_iter().enumerate() {
+        values.extend(means.relative[at].map(|value| (cell(kind, ConstancyNumber::Relative), value)));
+        values.push((cell(kind, ConstancyNumber::Linear), means.linear[at]));
+        values.push((cell(kind, ConstancyNumber::DeltaE), means.delta_e[at]));
+    }
+    values.push((cell(PictureKind::TextureBaseColor, ConstancyNumber::MeanPsnr), means.mean_psnr));
+    values.push((cell(PictureKind::TextureBaseColor, ConstancyNumber::MeanDeltaE), means.mean_delta_e));
+    values
+}
+
+/// The table of constancy.
+fn constancy() -> Layout {
+    let block = |(title, kind, numbers): (&'static str, PictureKind, &[ConstancyNumber])| Block {
+        title,
+        picture: PictureName::whole(kind),
+        views: Views::Observed,
+        quantities: numbers.iter().map(|number| Quantity::Constancy(*number)).collect(),
+    };
+    Layout { title: "Constancy of base colour over light".to_owned(), blocks: CONSTANCY.map(block).into() }
 }
 
 impl Quantity {
@@ -37,6 +102,8 @@ impl Quantity {
         match self {
             Self::Pixels => None,
             Self::Score(metric) => Some(metric.better()),
+            Self::Constancy(ConstancyNumber::MeanPsnr) => Some(Better::Higher),
+            Self::Constancy(_) => Some(Better::Lower),
         }
     }
 
@@ -45,6 +112,7 @@ impl Quantity {
         match self {
             Self::Pixels => NumberStyle { title: "Pixels", scale: 1.0, digits: 0 },
             Self::Score(metric) => metric.style(),
+            Self::Constancy(number) => number.style(),
         }
     }
 }
@@ -171,7 +239,7 @@ pub(super) fn all() -> Vec<Layout> {
     let specular = OURS
         .into_iter()
         .map(|(title, blocks)| layout(format!("{title}, specular regions only"), blocks, Surfaces::Specular));
-    plain.chain(specular).collect()
+    plain.chain(specular).chain([constancy()]).collect()
 }
 
 const HEADLINE: [BlockWords; 6] = [

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::{SceneId, SourceKind};
+use mateval_eval::constancy::Constancy;
 use mateval_eval::metric::{Better, Metric, PictureKind};
 use mateval_eval::result::key::{PictureName, ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
 use mateval_metrics::Psnr;
 
-use super::layouts::{CellKey, Grouping, Layout, Quantity, Value};
+use super::layouts::{CellKey, Grouping, Layout, Quantity, Value, constancy_values};
 use crate::titles::shown_method;
 
 /// One method's numbers.
@@ -47,10 +48,13 @@ pub(super) fn groups(
     let scored: Vec<(&ResultFile, &ProtocolResult)> =
         all.filter_map(|result| Some((result, result.protocols.get(protocol)?))).collect();
     let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<CellKey, Value>| {
-        let row = |(at, (result, scores)): (usize, &(&ResultFile, &ProtocolResult))| Row {
-            method: shown_method(result),
-            values: values(at, scores),
-            not_predicted: result.not_predicted.clone(),
+        let row = |(at, (result, scores)): (usize, &(&ResultFile, &ProtocolResult))| {
+            let mut values = values(at, scores);
+            let of_group = |family: &&Constancy| grouping == Grouping::Dataset || family.scene.as_str() == name;
+            let families: Vec<Constancy> = result.constancy.iter().filter(of_group).cloned().collect();
+            let constancy = constancy_values(&families).into_iter();
+            values.extend(constancy.map(|(key, value)| (key, Value { value, standard_error: None })));
+            Row { method: shown_method(result), values, not_predicted: result.not_predicted.clone() }
         };
         let mut rows: Vec<Row> = scored.iter().enumerate().map(row).collect();
         let ceiling = ceiling.and_then(|_| rows.pop());
