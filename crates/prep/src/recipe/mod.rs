@@ -11,7 +11,7 @@ use std::path::Path;
 
 use mateval_dataset::dataset::{Licence, TrueMaterials};
 use mateval_dataset::lighting::parse_twin;
-use mateval_dataset::{SourceKind, ViewId};
+use mateval_dataset::{SceneId, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::untrusted::{hint, mistaken_for, read_at_most, without_mark};
 use mateval_sources::front3d::camera_rules::CameraRules;
