@@ -7,6 +7,7 @@ use mateval_baselines::encoding_report::EncodingReport;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_dataset::material::MaterialClassesFile;
+use mateval_dataset::measured::{MeasuredFile, MeasurementsFile};
 use mateval_dataset::reference::{LightsFile, ReferenceFile, SourceMaterialsFile};
 use mateval_dataset::render_file::{RenderFile, ScorerFile};
 use mateval_dataset::submission::SubmissionFile;
@@ -42,7 +43,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 /// The JSON Schema of every kind of JSON file, made from the Rust type that reads and writes it.
-fn schemas() -> [(&'static str, Schema); 30] {
+fn schemas() -> [(&'static str, Schema); 31] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -51,6 +52,8 @@ fn schemas() -> [(&'static str, Schema); 30] {
         ("source_materials", schema_for!(SourceMaterialsFile)),
         ("lights", schema_for!(LightsFile)),
         ("material_classes", schema_for!(MaterialClassesFile)),
+        ("measured", schema_for!(MeasuredFile)),
+        ("measurements", schema_for!(MeasurementsFile)),
         ("render", schema_for!(RenderFile)),
         ("submission", schema_for!(SubmissionFile)),
         ("scorer", schema_for!(ScorerFile)),

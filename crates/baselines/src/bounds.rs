@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::{GREY as GREY_VALUE, MAP_SIZES, Map};
 use mateval_files::FileError;
@@ -24,6 +25,7 @@ pub const GREY: Baseline =
 
 /// Copies the baked maps of every instance and returns the number of instances.
 pub fn write_truth(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
+    dataset.scenes.iter().try_for_each(SceneFile::check_materials_known)?;
     // A public tree is refused before anything is written.
     for scene in dataset.scenes.iter().filter(|scene| !dataset.folder(&scene.id).truth().exists()) {
         dataset.check_files(&scene.id, |path| path.starts_with("ground_truth/materials/"))?;

@@ -326,6 +326,7 @@ struct InputView {
 
 impl InputView {
     fn read(dataset: &Dataset, scene: &SceneFile, map: Map) -> Result<Self, BaselineError> {
+        scene.check_materials_known()?;
         let folder = dataset.folder(&scene.id);
         let view = input_view(&folder, scene)?;
         let (shown, known) = (folder.view(&view.id), folder.truth_view(&view.id));

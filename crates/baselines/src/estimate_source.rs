@@ -148,7 +148,10 @@ impl EstimateSource {
     ) -> Result<Estimate, BaselineError> {
         let folder = dataset.folder(&scene.id);
         match self {
-            Self::Truth => truth(&folder, input_view(&folder, scene)?)?.of_one_size(folder.path(), scene.id.as_str()),
+            Self::Truth => {
+                scene.check_materials_known()?;
+                truth(&folder, input_view(&folder, scene)?)?.of_one_size(folder.path(), scene.id.as_str())
+            }
             Self::Input => photo(&folder, input_view(&folder, scene)?, scene.exposure as f32),
             Self::Delight(lights) => {
                 let geometry = SceneGeometry::read(folder, scene)?;

@@ -126,7 +126,7 @@ pub struct ScoreArgs {
     /// Score this scene only; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
-    /// Protocol to score under; may be given several times.
+    /// Protocol to score under, `capture-1` for captured rooms; may be given several times.
     #[arg(long = "protocol", value_name = "PROTOCOL", default_values = ["mateval-3"])]
     protocols: Vec<String>,
     /// Number of scenes that are scored at once. More take more memory and leave fewer threads idle.

@@ -52,6 +52,12 @@ pub enum DatasetError {
         path.display()
     )]
     SecretTruth { path: PathBuf },
+    /// A captured scene has no true materials.
+    #[error(
+        "scene '{scene}' is captured: its true materials are not known, and the files of ground_truth hold placeholders; \
+         leave it out, or score it by its measured colours: mateval eval score --protocol capture-1"
+    )]
+    Captured { scene: SceneId },
     /// A file of another version than the one that is read here.
     #[error(
         "'{}' has the format '{found}', and this version of MatEval reads '{expected}': {}",

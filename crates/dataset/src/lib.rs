@@ -18,9 +18,9 @@ pub mod splitmix64;
 pub mod word_enum;
 
 pub use foreign::{gltf_file, obj, specular_glossiness};
-pub use format::{dataset, glb, json, layout, manifest, reference, submission, withheld};
+pub use format::{dataset, glb, json, layout, manifest, measured, reference, submission, withheld};
 pub use records::{changes, render_file, scene_cost, verdict};
-pub use values::{camera, findings, ids, lighting, material, mesh, uv_atlas};
+pub use values::{camera, findings, ids, lens, lighting, material, mesh, uv_atlas};
 
 pub use camera::{Camera, Intrinsics};
 pub use dataset::{Role, SceneLights, SourceKind};

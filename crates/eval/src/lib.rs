@@ -18,6 +18,7 @@
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
 //! Of a scene with twins, [`constancy`] then compares the maps of scene and twins with each other.
+//! A captured scene has no true maps: [`materials::measured`] compares means over regions with measured colours.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
 //! ([`result::means`]): pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.
@@ -37,7 +38,8 @@ pub mod truth;
 pub mod verify;
 
 pub mod materials {
-    //! Submissions' maps compared with the true ones, without light.
+    //! Submissions' maps compared with the true ones, or with measured colours, without light.
+    pub mod measured;
     pub mod pictures;
     pub mod score;
     pub mod texels;

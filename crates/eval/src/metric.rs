@@ -7,6 +7,7 @@ use mateval_dataset::submission::Map;
 use mateval_dataset::word_enum;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::mask_rule::{MaskRule, ReferenceFeatures};
+use mateval_metrics::measured::{RegionColors, maw_chromaticity, maw_intensity, region_delta_e};
 use mateval_metrics::{Lpips, MetricError, Net, delta_e, flip, mae};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -82,6 +83,10 @@ pub enum Measure {
     /// Of linear colours, not clipped. Renders have none without noise.
     Linear(fn(&Picture<LinearRgb>, &Picture<LinearRgb>, &Mask) -> Measured),
     Encoded(fn(&EncodedPair<'_>) -> Measured),
+    /// Of the means over regions whose colour was measured.
+    Regions(fn(&[RegionColors]) -> Option<f64>),
+    /// The same of the picture that MAW compares.
+    MawRegions(fn(&[RegionColors]) -> Option<f64>),
 }
 
 pub enum Stated {
@@ -111,6 +116,7 @@ const COLOURS: &[PictureKind] = &[
     PictureKind::RgbFitted,
 ];
 const TEXELS: &[PictureKind] = &[PictureKind::TextureBaseColor];
+const MEASURED: &[PictureKind] = &[PictureKind::Measured];
 
 const fn style(title: &'static str, scale: f64, digits: usize) -> NumberStyle {
     NumberStyle { title, scale, digits }
@@ -143,7 +149,7 @@ metrics! {
     Mse = "mse" => MetricRow {
         style: style("MSE (1e-3)", 1e3, 3),
         better: Better::Lower,
-        of: &[PictureKind::ALL],
+        of: &[COLOURS, SCALARS, TEXELS],
         measure: Measure::SquaredError,
         stated: Stated::Exactly,
         definition: "mean squared error over the region's pixels and channels. Albedo: linear, not clipped. Roughness \
@@ -209,6 +215,33 @@ metrics! {
         definition: "CIEDE2000 (Sharma et al. 2005): linear colours clipped to 0..1, CIE Lab under D65; mean over the \
             mask",
     };
+    RegionDeltaE = "region_delta_e" => MetricRow {
+        style: style("CIEDE2000", 1.0, 3),
+        better: Better::Lower,
+        of: &[MEASURED],
+        measure: Measure::Regions(region_delta_e),
+        stated: Stated::Exactly,
+        definition: "CIEDE2000 between the mean predicted base colour of a region, linear, and its measured colour, \
+            without any scale; Lab as colour-science has it by default; mean over regions, which count alike",
+    };
+    MawIntensity = "maw_intensity" => MetricRow {
+        style: style("MAW intensity (1e-3)", 1e3, 3),
+        better: Better::Lower,
+        of: &[MEASURED],
+        measure: Measure::MawRegions(maw_intensity),
+        stated: Stated::Exactly,
+        definition: "MAW's `si`, `mean`: squared difference of the means over channels after the one factor that fits \
+            all regions of the picture; of MAW's 8-bit picture of 320x240; regions count by their pixels",
+    };
+    MawChromaticity = "maw_chromaticity" => MetricRow {
+        style: style("MAW chromaticity", 1.0, 3),
+        better: Better::Lower,
+        of: &[MEASURED],
+        measure: Measure::MawRegions(maw_chromaticity),
+        stated: Stated::Exactly,
+        definition: "MAW's `per_si`, `deltae`: CIEDE2000 after a factor for each region that makes its mean over \
+            channels the measured one; of the same picture; regions count by their pixels",
+    };
 }
 
 pub const LPIPS_NET: Net = Net::Alex;
@@ -257,13 +290,15 @@ word_enum! {
     Metallic = "metallic",
     /// The texels of base colour.
     TextureBaseColor = "texture_base_color",
+    /// The mean base colour of regions whose colour was measured.
+    Measured = "measured",
 }
 
 impl PictureKind {
     /// The map that it shows; none for light, which comes from all of them.
     pub const fn map(self) -> Option<Map> {
         match self {
-            Self::Albedo | Self::AlbedoAligned | Self::TextureBaseColor => Some(Map::BaseColor),
+            Self::Albedo | Self::AlbedoAligned | Self::TextureBaseColor | Self::Measured => Some(Map::BaseColor),
             Self::Roughness => Some(Map::Roughness),
             Self::Metallic => Some(Map::Metallic),
             Self::RgbTrue | Self::RgbFitted | Self::RgbRelit => None,
@@ -282,8 +317,11 @@ pub(crate) fn markdown() -> String {
     let row = |metric: &Metric| {
         let MetricRow { better, of, measure, definition, .. } = metric.row();
         let better = if *better == Better::Lower { "lower" } else { "higher" };
-        let whole = matches!(measure, Measure::Linear(_) | Measure::Encoded(_));
-        let where_ = if whole { "`input`, `novel`, `wide`" } else { "all" };
+        let where_ = match measure {
+            Measure::Linear(_) | Measure::Encoded(_) => "`input`, `novel`, `wide`",
+            Measure::Regions(_) | Measure::MawRegions(_) => "`input`",
+            Measure::SquaredError | Measure::Scalars(_) => "all",
+        };
         let of: Vec<String> = of.iter().copied().flatten().map(|kind| format!("`{kind}`")).collect();
         format!("| `{metric}` | {better} | {} | {where_} | {definition} |\n", of.join(" "))
     };

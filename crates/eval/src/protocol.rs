@@ -3,18 +3,20 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::SceneId;
+use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::lighting::RelitRules;
 use mateval_dataset::material::PrincipledFlavour;
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_stage::StageRules;
 use mateval_metrics::mask_rule::MaskRule;
+use mateval_metrics::measured::{MAW_LEAST, MAW_SIZE};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::fixed_rules::FixedRules;
 use crate::metric::PictureKind;
-use crate::result::key::{HEADLINE, PAPER_HEADLINE, ResultKey};
+use crate::result::key::{CAPTURE_HEADLINE, HEADLINE, PAPER_HEADLINE, ResultKey};
 
 /// Colour space in which MSE and PSNR of albedo are taken. SSIM and LPIPS always see sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -30,7 +32,7 @@ pub enum AlbedoSpace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
-    /// `mateval-3` or `paper`.
+    /// `mateval-3`, `paper` or `capture-1`.
     pub name: String,
     /// The treatment of pixels outside a mask.
     pub mask_rule: MaskRule,
@@ -44,18 +46,40 @@ pub struct Protocol {
     pub headline: Vec<ResultKey>,
     /// The rules of scores under light.
     pub light: LightRules,
+    /// The rules of measured colours. A protocol that has them scores captured scenes alone, all others score all but
+    /// captured scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<MeasuredRules>,
     /// Constants that all protocols share because the code holds them.
     pub fixed: FixedRules,
     /// The version of the scorer; `CHANGELOG.md` lists what each changed.
     pub scorer_version: u32,
 }
 
+/// How predictions are compared with measured colours.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredRules {
+    /// Width and height of the picture that MAW's two numbers are taken from.
+    pub maw_size: [usize; 2],
+    /// The least denominator of MAW's factors.
+    pub maw_least: f64,
+}
+
+impl MeasuredRules {
+    /// The code holds these constants, and no protocol can change them.
+    const OF_THIS_SCORER: Self = Self { maw_size: MAW_SIZE, maw_least: MAW_LEAST };
+}
+
 /// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version
 /// changed.
 pub const SCORER_VERSION: u32 = 10;
 
+/// The protocol of captured scenes.
+const CAPTURE: &str = "capture-1";
+
 impl Protocol {
-    pub const NAMES: [&str; 2] = ["mateval-3", "paper"];
+    pub const NAMES: [&str; 3] = ["mateval-3", "paper", CAPTURE];
 
     pub fn named(name: &str) -> Result<Self, EvalError> {
         let (mask_rule, albedo_space, light) = match name {
@@ -69,6 +93,11 @@ impl Protocol {
                 light.samples.fix(16);
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
+            // Nothing of a captured room is known but measured colours.
+            CAPTURE => {
+                let light = LightRules::new(Vec::new(), PrincipledFlavour::Blender);
+                (MaskRule::Inside, AlbedoSpace::Linear, light)
+            }
             _ => return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES }),
         };
         Ok(Self {
@@ -78,11 +107,21 @@ impl Protocol {
             // The paper has none.
             wide_views: name != "paper",
             rounded_decimals: 6,
-            headline: if name == "paper" { PAPER_HEADLINE.to_vec() } else { HEADLINE.to_vec() },
+            headline: match name {
+                "paper" => PAPER_HEADLINE.to_vec(),
+                CAPTURE => CAPTURE_HEADLINE.to_vec(),
+                _ => HEADLINE.to_vec(),
+            },
             light,
+            measured: (name == CAPTURE).then_some(MeasuredRules::OF_THIS_SCORER),
             fixed: FixedRules::of_this_scorer(),
             scorer_version: SCORER_VERSION,
         })
+    }
+
+    /// Whether it has values for the scene.
+    pub fn scores(&self, scene: &SceneFile) -> bool {
+        self.measured.is_none() == scene.source.kind.states_materials()
     }
 
     /// Fails if this scorer cannot score under the protocol: it is of another version, or its code holds other
@@ -90,7 +129,10 @@ impl Protocol {
     pub fn check(&self) -> Result<(), EvalError> {
         let versions = [self.scorer_version, SCORER_VERSION].map(|version| version.to_string());
         let of_version = (versions[0] != versions[1]).then(|| ("scorer_version".to_owned(), versions));
-        match of_version.or_else(|| self.fixed.first_difference(&FixedRules::of_this_scorer())) {
+        let known = MeasuredRules::OF_THIS_SCORER;
+        let measured = self.measured.as_ref().filter(|rules| **rules != known);
+        let measured = measured.map(|rules| ("measured".to_owned(), [rules, &known].map(|rules| format!("{rules:?}"))));
+        match of_version.or(measured).or_else(|| self.fixed.first_difference(&FixedRules::of_this_scorer())) {
             Some((rule, [found, expected])) => {
                 Err(EvalError::OtherRule { protocol: self.name.clone(), rule, expected, found })
             }
@@ -313,10 +355,18 @@ mod tests {
     }
 
     #[test]
+    fn rules_of_measured_colours_are_those_of_the_code() {
+        let mut protocol = Protocol::named(CAPTURE).unwrap();
+        assert!(protocol.check().is_ok());
+        protocol.measured = Some(MeasuredRules { maw_least: 0.5, ..MeasuredRules::OF_THIS_SCORER });
+        assert!(protocol.check().unwrap_err().to_string().contains("states measured = MeasuredRules"));
+    }
+
+    #[test]
     fn an_unknown_name_says_what_is_known() {
         for name in ["papr", "mateval-2"] {
             let error = Protocol::named(name).unwrap_err().to_string();
-            assert!(error.contains(name) && error.contains("use one of: mateval-3, paper"), "{error}");
+            assert!(error.contains(name) && error.contains("use one of: mateval-3, paper, capture-1"), "{error}");
         }
     }
 

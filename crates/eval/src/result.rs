@@ -13,6 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::constancy::Constancy;
+use crate::materials::measured::MeasuredValues;
 use crate::metric::{Metric, PictureKind};
 use crate::protocol::Protocol;
 use crate::result::key::{PictureName, Region, ResultKey, Views};
@@ -107,6 +108,9 @@ pub struct ProtocolResult {
     pub texels: Vec<InstanceTexelErrors>,
     /// The errors of each instance's pixels.
     pub instances: Vec<InstancePixelErrors>,
+    /// The regions whose colour was measured; only under `capture-1`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub measured: Vec<MeasuredValues>,
 }
 
 /// Whether two renderers show the same rooms.

@@ -19,6 +19,7 @@ use crate::error::EvalError;
 use crate::light::difference::base_color_ratio;
 use crate::light::mse::LightMse;
 use crate::light::reference::StoredReference;
+use crate::materials::measured::MeasuredValues;
 use crate::metric::PictureKind;
 use crate::open_scene::ViewSet;
 use crate::pictures_dir::PicturesDir;
@@ -135,6 +136,8 @@ pub(crate) struct SceneScore {
     pub(crate) pictures: Vec<PictureValues>,
     pub(crate) texels: Vec<InstanceTexelErrors>,
     pub(crate) instances: Vec<InstancePixelErrors>,
+    #[serde(default)]
+    pub(crate) measured: Vec<MeasuredValues>,
     /// Standard errors of the scene's mean PSNRs of light, in dB.
     pub(crate) noise: BTreeMap<ResultKey, f64>,
     pub(crate) fit: Option<FittedRadiances>,

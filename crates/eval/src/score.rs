@@ -454,8 +454,22 @@ fn finish(
             entry.findings.push(Finding::new(Severity::Warning, "not_finite_light", file, "", message, action));
         }
     }
+    for scene in scored {
+        let without = plan.protocols.iter().filter(|protocol| !protocol.scores(scene));
+        let names: Vec<&str> = without.map(|protocol| protocol.name.as_str()).collect();
+        if !names.is_empty() {
+            let file = format!("scenes/{}/scene.json", scene.id);
+            let (message, action) = match scene.source.kind.states_materials() {
+                false => ("the scene is captured, so that its true materials are not known", "--protocol capture-1"),
+                true => ("the scene is not captured, so that no colour in it was measured", "another --protocol"),
+            };
+            let action = format!("has no value under '{}'; score it with {action}", names.join("', '"));
+            entry.findings.push(Finding::new(Severity::Note, "other_protocol", file, "/source/kind", message, action));
+        }
+    }
     if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
-        for scene in scored.iter().filter(|scene| scene.photo.is_some()) {
+        let has_unknown_light = |scene: &&&SceneFile| scene.photo.is_some() && scene.source.kind.states_materials();
+        for scene in scored.iter().filter(has_unknown_light) {
             let file = format!("scenes/{}/scene.json", scene.id);
             let message = "the input picture is a photo from elsewhere, and the true light of the scene is not known";
             let action = "scored its materials and not its light";
@@ -508,12 +522,13 @@ fn protocol_result(
     not_predicted: &[Map],
 ) -> ProtocolResult {
     let has_value = |kind: PictureKind| kind.map().is_none_or(|map| !not_predicted.contains(&map));
-    let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut pictures, mut texels, mut instances, mut measured) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
     for (scene, score) in scores {
         pictures.extend(score.pictures.into_iter().filter(|picture| has_value(picture.picture.kind)));
         texels.extend(score.texels.into_iter().filter(|_| has_value(PictureKind::TextureBaseColor)));
         instances.extend(score.instances.into_iter().filter(|errors| has_value(errors.picture)));
+        measured.extend(score.measured.into_iter().filter(|_| has_value(PictureKind::Measured)));
         if !score.noise.is_empty() {
             noise.insert(scene.clone(), score.noise);
         }
@@ -522,7 +537,19 @@ fn protocol_result(
     let (scenes, summary) = means(&pictures, &texels);
     let summary_noise = summary_noise(&noise, &scenes);
     let protocol = protocol.clone();
-    ProtocolResult { protocol, fingerprint, summary, scenes, summary_noise, noise, fits, pictures, texels, instances }
+    ProtocolResult {
+        protocol,
+        fingerprint,
+        summary,
+        scenes,
+        summary_noise,
+        noise,
+        fits,
+        pictures,
+        texels,
+        instances,
+        measured,
+    }
 }
 
 /// Whether the dataset was rendered by the scorer, so that scenes of unknown light aside each has a reference.
@@ -582,8 +609,19 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
 fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> {
     let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
     let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
+    let scores = |at: usize| task.protocols[at].scores(task.scene);
+    if !task.scene.source.kind.states_materials() {
+        if (0..task.protocols.len()).any(scores) {
+            task.score_measured(&scores, &mut sheets)?;
+        }
+        let finish = |sheets: Vec<ScoreSheet>| sheets.into_iter().map(|sheet| sheet.score).collect();
+        return Ok(sheets.into_iter().map(finish).collect());
+    }
+    if !(0..task.protocols.len()).any(scores) {
+        return Ok(sheets.into_iter().map(|sheets| sheets.into_iter().map(|sheet| sheet.score).collect()).collect());
+    }
     for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {
-        let wanted = |at: usize| task.set == ViewSet::Turned || task.protocols[at].wide_views;
+        let wanted = |at: usize| scores(at) && (task.set == ViewSet::Turned || task.protocols[at].wide_views);
         if !(0..task.protocols.len()).any(wanted) {
             continue;
         }

@@ -33,6 +33,7 @@ pub fn scene_albedo(
     scene: &SceneFile,
     submissions: &[&Path],
 ) -> Result<Vec<SceneAlbedo>, EvalError> {
+    scene.check_materials_known()?;
     let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
     let predictions = predictions_of(submissions, scene, &atlases)?;
     let view = |view: &View| {

@@ -8,6 +8,7 @@
 
 mod suite {
     mod cache;
+    mod capture;
     mod constancy;
     mod damages;
     mod mask_rules;

@@ -120,6 +120,27 @@ pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, Malformed> {
     )
 }
 
+/// The shape of an array of floating-point numbers, and its numbers row by row.
+pub fn real_numbers(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Malformed> {
+    fn numbers(file: npyz::NpyFile<&[u8]>, data: &[u8]) -> Result<Vec<f64>, Malformed> {
+        read_numbers!(file, data, "expected f4 or f8";
+            f64 => |numbers| numbers,
+            f32 => |numbers: Vec<f32>| numbers.into_iter().map(f64::from).collect(),
+        )
+    }
+    let (file, data) = open(bytes)?;
+    check_order(&file)?;
+    let shape = file.shape().to_vec();
+    Ok((shape, numbers(file, data)?))
+}
+
+fn check_order(file: &npyz::NpyFile<&[u8]>) -> Result<(), Malformed> {
+    if file.order() == npyz::Order::C {
+        return Ok(());
+    }
+    Err(Malformed("an array in Fortran order; save numpy.ascontiguousarray(array)".to_owned()))
+}
+
 /// Rows, columns and channels of an array, and which axis holds the channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Layout {
@@ -196,9 +217,7 @@ pub(crate) fn texture_of_npy(path: &Path, bytes: &[u8], encoding: Encoding, wrap
 }
 
 fn numbers(file: npyz::NpyFile<&[u8]>, data: &[u8]) -> Result<Numbers, Malformed> {
-    if file.order() != npyz::Order::C {
-        return Err(Malformed("an array in Fortran order; save numpy.ascontiguousarray(array)".to_owned()));
-    }
+    check_order(&file)?;
     read_numbers!(file, data, "expected u1, u2, f2, f4 or f8; convert it with array.astype('f4')";
         u8 => Numbers::Bytes,
         u16 => Numbers::Words,

@@ -93,6 +93,30 @@ impl PhotoFile {
     }
 }
 
+/// The most places a side, in a pixel of a resampled photo, whose mean is the pixel.
+const MOST_PLACES: usize = 8;
+
+impl PhotoFile {
+    /// The photo as another camera at its place takes it: `place` is where the photo shows a point of the new picture,
+    /// both in pixels from the upper left corner. Each pixel is the mean of bilinear lookups, about one for each pixel
+    /// of the photo. Beyond the photo its edge continues.
+    pub fn resampled(&self, width: usize, height: usize, place: impl Fn([f64; 2]) -> [f64; 2]) -> Picture<LinearRgb> {
+        let ratio = (self.width() as f64 / width as f64).max(self.height() as f64 / height as f64);
+        let places = (ratio.ceil() as usize).clamp(1, MOST_PLACES);
+        let step = |at: usize, part: usize| at as f64 + (part as f64 + 0.5) / places as f64;
+        let (columns, rows) = (self.width() as f64, self.height() as f64);
+        Picture::from_fn(width, height, |x, y| {
+            let mut mean = [0.0; 3];
+            for part in 0..places * places {
+                let [column, row] = place([step(x, part % places), step(y, part / places)]);
+                let texel = self.pixels.sample([(column / columns) as f32, (1.0 - row / rows) as f32]);
+                mean.iter_mut().zip(texel).for_each(|(mean, v)| *mean += f64::from(v) / (places * places) as f64);
+            }
+            LinearRgb(mean.map(|v| v as f32))
+        })
+    }
+}
+
 /// What the header of a Radiance HDR states of its numbers that makes them other than linear Rec. 709 (Ward, "Radiance
 /// file formats"); none for other files. Of several exposures and corrections the product counts.
 fn other_radiance(bytes: &[u8]) -> Option<String> {
@@ -177,6 +201,32 @@ mod tests {
                 assert!([expected, row, 8.0].iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
             }
         }
+    }
+
+    /// Of a photo whose values are its coordinates, each pixel of the other camera's picture is the place that it shows.
+    #[test]
+    fn resampling_looks_at_the_place_of_each_pixel() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let picture = Picture::from_fn(40, 30, |x, y| LinearRgb([x as f32 + 0.5, y as f32 + 0.5, 1.0]));
+        exr_io::write_linear(&path, &picture, exr_io::Precision::Float).unwrap();
+        let photo = read(&path).unwrap();
+        let turned = |[x, y]: [f64; 2]| [20.0 + 0.6 * (x - 5.0) - 0.3 * y, 10.0 + 0.3 * (x - 5.0) + 0.6 * y];
+        for (width, height) in [(10, 8), (40, 30)] {
+            let scale = 10.0 / width as f64;
+            let found = photo.resampled(width, height, |[x, y]| turned([x * scale, y * scale]));
+            let (x, y) = (width / 2, height / 2);
+            let expected = turned([(x as f64 + 0.5) * scale, (y as f64 + 0.5) * scale]);
+            let LinearRgb(pixel) = found.get(x, y);
+            assert!(
+                (0..2).all(|axis| (f64::from(pixel[axis]) - expected[axis]).abs() < 1e-4),
+                "{pixel:?} {expected:?}"
+            );
+        }
+        let (same, whole) = (photo.resampled(40, 30, |place| place), photo.resized(40, 30));
+        let off =
+            |(a, b): (&LinearRgb, &LinearRgb)| (0..3).map(|axis| (a.0[axis] - b.0[axis]).abs()).fold(0.0, f32::max);
+        assert!(same.pixels().iter().zip(whole.pixels()).map(off).all(|off| off < 1e-4));
     }
 
     #[test]

@@ -99,6 +99,18 @@ pub fn read_mask(path: &Path) -> Result<Mask, ImageError> {
     Picture::new(raw.width, raw.height, raw.data.iter().map(|byte| *byte == 255).collect())
 }
 
+/// Reads 8- or 16-bit grey as whole numbers from the bytes of an untrusted file; `path` serves for errors only. A palette
+/// would hide which number is meant, so that such a file is refused like any other kind.
+pub fn numbers_of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Picture<u16>, ImageError> {
+    let raw = decode_bytes(path, bytes)?;
+    let numbers = match (raw.color, raw.depth) {
+        (png::ColorType::Grayscale, png::BitDepth::Eight) => raw.data.iter().map(|byte| u16::from(*byte)).collect(),
+        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => raw.words(),
+        _ => return Err(raw.unexpected(path, "8- or 16-bit grey, whose numbers are regions")),
+    };
+    Picture::new(raw.width, raw.height, numbers)
+}
+
 type PixelFormat = (png::ColorType, png::BitDepth);
 
 fn write<T: Copy>(path: &Path, picture: &Picture<T>, format: PixelFormat, data: &[u8]) -> Result<(), ImageError> {

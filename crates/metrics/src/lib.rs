@@ -9,7 +9,7 @@
 //! responses of two trained networks (Zhang et al. 2018). The windows and filters of the last three reach across the
 //! mask's edge: [`pixel`] holds the two ways to fill the pixels outside. FLIP has the reference's there, and SSIM and
 //! LPIPS have two rules each ([`mask_rule`]). [`alignment`] takes the scale of each channel away before colours are
-//! compared.
+//! compared. [`measured`] compares the means of regions with colours that were measured.
 //!
 //! Means are summed in `f64` in a fixed order, so the number of threads changes no bit. A NaN or infinite value inside
 //! the mask is an error. Values outside the mask are not read, save the reference's where they fill the prediction.
@@ -19,6 +19,7 @@ pub mod delta_e;
 pub mod flip;
 pub mod lpips;
 pub mod mask_rule;
+pub mod measured;
 pub mod mse;
 pub mod pixel;
 pub mod ssim;

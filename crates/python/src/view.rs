@@ -157,9 +157,11 @@ impl View {
         shown_in_notebook(slf, "view")
     }
 
-    /// The ground truth. Raises `mateval.Withheld` where the dataset does not hold it.
+    /// The ground truth. Raises `mateval.Withheld` where the dataset does not hold it, and `mateval.Error` where the scene
+    /// is captured, whose true materials nobody knows.
     #[getter]
     fn truth(&self) -> PyResult<Truth> {
+        self.source.file().check_materials_known().map_err(failed)?;
         let folder = self.source.folder().truth_view(&self.file().id);
         if folder.is_dir() {
             return Ok(Truth { source: Arc::clone(&self.source), at: self.at });

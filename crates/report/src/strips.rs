@@ -65,10 +65,11 @@ pub(crate) struct StripRow {
 }
 
 impl StripPlan<'_> {
-    /// What is shown of the scene: no light where the scene has a photo from elsewhere, whose light is not known.
+    /// What is shown of the scene: no light where the scene has a photo from elsewhere, whose light is not known, and
+    /// nothing where it is captured, so that its true materials are not known either.
     pub(crate) fn shown_of(&self, scene: &SceneFile) -> impl Iterator<Item = Shown> {
-        let has_light = scene.photo.is_none();
-        self.shown.iter().copied().filter(move |shown| has_light || *shown == Shown::Albedo)
+        let (has_light, has_materials) = (scene.photo.is_none(), scene.source.kind.states_materials());
+        self.shown.iter().copied().filter(move |shown| has_materials && (has_light || *shown == Shown::Albedo))
     }
 }
 
@@ -91,6 +92,11 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
     let chosen = plan.dataset.chosen_scenes(plan.scenes)?;
     if let Some(absence) = plan.dataset.absence().filter(|_| plan.scenes.is_empty()) {
         progress(Report::Message(&absence));
+    }
+    for scene in chosen.iter().filter(|scene| !scene.source.kind.states_materials()) {
+        let message =
+            format!("scene {} is captured: its true materials are not known, so it has no pictures", scene.id);
+        progress(Report::Message(&message));
     }
     let paths = |scene: &SceneId, shown: Shown| {
         ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.kind())))

@@ -28,6 +28,7 @@ impl Titled for PictureKind {
             Self::Roughness => "Roughness",
             Self::Metallic => "Metallic",
             Self::TextureBaseColor => "Base colour texels",
+            Self::Measured => "Measured colours",
         }
     }
 }

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
+use mateval_dataset::lens::Lens;
 use mateval_dataset::material::MaterialClass;
 use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, Finding, Role, SceneLights, Severity, SourceKind, TriangleMesh};
 use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, LookedFor, SourceFolder};
+use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::{FewerBits, is_turned};
 use mateval_image::{ImageError, Texels, Texture};
 
@@ -113,6 +115,18 @@ pub struct SourceScene {
     /// What was read. Each surface becomes an instance.
     pub read: FileScene,
     pub camera: Camera,
+    /// The photo of a captured room.
+    pub captured: Option<CapturedPhoto>,
+}
+
+/// The photo that the camera of a captured room took.
+#[derive(Clone, Debug)]
+pub struct CapturedPhoto {
+    /// Its path in the folder of the source.
+    pub file: String,
+    pub photo: PhotoFile,
+    /// Its size is that of the photo.
+    pub lens: Lens,
 }
 
 /// The licence beside the scene. A scene must not be passed on without it, so an unreadable licence is a finding.

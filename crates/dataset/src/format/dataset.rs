@@ -8,9 +8,11 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use crate::DatasetError;
 use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
+use crate::lens::Lens;
 use crate::lighting::LightingName;
 use crate::material::MaterialParameter;
 
@@ -283,7 +285,7 @@ pub enum WeakReason {
 }
 
 /// An input picture that came from elsewhere.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Photo {
     /// Its path, which `source.files` lists with its hash.
@@ -292,6 +294,10 @@ pub struct Photo {
     pub size: [u32; 2],
     /// How its values were read.
     pub encoding: PhotoEncoding,
+    /// The lens that it was undistorted from: `lens` shows the direction (x, y) of the camera's picture at its place in
+    /// the file. Absent where the photo was only reduced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<Lens>,
 }
 
 /// How the values of a photo's file state radiance.
@@ -444,6 +450,14 @@ impl SceneFile {
         self.redressed.is_some() || self.source.private
     }
 
+    /// Fails where the true materials are not known, for work that needs them.
+    pub fn check_materials_known(&self) -> Result<(), DatasetError> {
+        match self.source.kind.states_materials() {
+            true => Ok(()),
+            false => Err(DatasetError::Captured { scene: self.id.clone() }),
+        }
+    }
+
     pub fn view(&self, id: &str) -> Option<&View> {
         self.views.iter().find(|view| view.id.as_str() == id)
     }
@@ -510,6 +524,16 @@ pub enum SourceKind {
     Gltf,
     /// A Blender file, which Blender baked.
     Blend,
+    /// A real room, scanned and photographed, whose materials nobody knows.
+    Capture,
+}
+
+impl SourceKind {
+    /// Whether the source states what its surfaces are made of. Otherwise the materials of `ground_truth` are
+    /// placeholders: they are no truth, and only measured colours are scored.
+    pub fn states_materials(self) -> bool {
+        self != Self::Capture
+    }
 }
 
 /// The word that JSON files use.

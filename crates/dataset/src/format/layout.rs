@@ -119,6 +119,16 @@ impl SceneFolder {
         self.truth().join("lights.json")
     }
 
+    /// `ground_truth/measured.json`: the measured colours of a captured scene.
+    pub fn measured(&self) -> PathBuf {
+        self.truth().join("measured.json")
+    }
+
+    /// `ground_truth/views/<view>/measured.png`: the regions whose colour was measured.
+    pub fn measured_regions(&self, view: &ViewId) -> PathBuf {
+        self.truth_view(view).join("measured.png")
+    }
+
     /// `ground_truth/material_classes.json`: the class of material of each part, where the source's reader states it.
     pub fn material_classes(&self) -> PathBuf {
         self.truth().join("material_classes.json")

@@ -5,6 +5,7 @@ pub mod glb;
 pub mod json;
 pub mod layout;
 pub mod manifest;
+pub mod measured;
 pub mod reference;
 pub mod submission;
 pub mod withheld;

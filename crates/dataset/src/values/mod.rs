@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod findings;
 pub mod ids;
+pub mod lens;
 pub mod lighting;
 pub mod material;
 pub mod mesh;

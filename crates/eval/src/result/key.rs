@@ -105,6 +105,12 @@ pub const PAPER_HEADLINE: [ResultKey; 4] = [
     psnr(PictureKind::Albedo, Views::Novel),
 ];
 
+pub const CAPTURE_HEADLINE: [ResultKey; 3] = [
+    ResultKey::whole(PictureKind::Measured, Views::Input, Metric::RegionDeltaE),
+    ResultKey::whole(PictureKind::Measured, Views::Input, Metric::MawIntensity),
+    ResultKey::whole(PictureKind::Measured, Views::Input, Metric::MawChromaticity),
+];
+
 /// A text that is not a key of a result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BadResultKey {
@@ -222,7 +228,7 @@ mod tests {
     #[test]
     fn keys_are_parsed_from_what_they_print() {
         let keys = all();
-        assert_eq!(keys.len(), 8 * 2 * 6 * Metric::ALL.len());
+        assert_eq!(keys.len(), 9 * 2 * 6 * Metric::ALL.len());
         for key in &keys {
             assert_eq!(key.to_string().parse(), Ok(*key));
             let json = serde_json::to_string(key).unwrap();

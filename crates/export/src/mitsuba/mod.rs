@@ -46,6 +46,7 @@ pub fn export_view(
     samples: u32,
     out: &Path,
 ) -> Result<Vec<Finding>, ExportError> {
+    dataset.scene(scene)?.check_materials_known()?;
     let found = dataset.scene(scene)?.views.iter().find(|known| known.id == *view);
     let no_view = || ExportError::NoView { path: dataset.root.clone(), scene: scene.clone(), view: view.clone() };
     let camera = found.ok_or_else(no_view)?.camera;

@@ -36,6 +36,8 @@ pub enum BuildFault {
     Bake(#[from] BakeFault),
     #[error("photo: {0}")]
     Photo(PhotoFault),
+    #[error("measured: {0}")]
+    Measured(RegionFault),
     /// The input view shows no instance that has an atlas.
     #[error(
         "the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera{}",
@@ -95,6 +97,17 @@ pub enum PhotoFault {
          pixels are near 1 with it; state another `exposure`, or fix the photo"
     )]
     Black { file: String, largest: f32, exposure: f64 },
+    #[error(
+        "'{file}' is {}x{}, and its camera states {}x{}; use the photo that the cameras were computed from, and no thumbnail \
+         or enlarged copy of it",
+        found[0], found[1], stated[0], stated[1]
+    )]
+    OtherSize { file: String, found: [u32; 2], stated: [u32; 2] },
+    #[error(
+        "'{file}' cannot be undistorted over its whole picture: k1, k2, p1, p2 are {k:?}; undistort or crop it with the \
+         program that computed its camera"
+    )]
+    Lens { file: String, k: [f64; 4] },
     /// The photo shows more or less than the camera, or is smaller than its picture.
     #[error(
         "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; \
@@ -108,6 +121,27 @@ pub enum PhotoFault {
         /// Columns and rows of the camera's picture.
         expected: [u32; 2],
     },
+}
+
+/// Why measured colours cannot be scored.
+#[derive(Debug, thiserror::Error)]
+pub enum RegionFault {
+    #[error(transparent)]
+    File(#[from] FileFault),
+    #[error(transparent)]
+    Picture(#[from] ImageError),
+    #[error("no region is of the photo '{photo}'; there are those of {known}")]
+    OtherPhotos { photo: String, known: String },
+    #[error("'{mask}' is {}x{}, and the photo {}x{}: expected a pixel for each of the photo's", found[0], found[1], expected[0], expected[1])]
+    Size { mask: String, found: [u32; 2], expected: [u32; 2] },
+    #[error("'{mask}' does not show the region '{name}', the value {value}")]
+    Absent { mask: String, name: String, value: String },
+    #[error("{count} regions; expected at most {}", u16::MAX)]
+    TooMany { count: usize },
+    #[error(
+        "none of the {count} regions shows a valid pixel of the input view: they lie outside of it, or the mesh has holes there"
+    )]
+    NoneSeen { count: usize },
 }
 
 /// A file that differs from those that the recipe pins.

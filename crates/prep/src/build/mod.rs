@@ -2,8 +2,8 @@
 //!
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
 //! reads the source and chooses the input camera, and `redress` gives it other materials if the recipe says so; `plan`
-//! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one, converts the materials
-//! and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
+//! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one and the colours that were
+//! `measured` in it, converts the materials and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
 //! become a wrong truth; [`materials`] unwraps every instance and bakes its material ([`baking`]); meshes and
 //! `scene.json` are written here. [`finish`] makes the `twins` of rendered scenes
 //! and writes the files of the whole dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a
@@ -14,6 +14,7 @@ pub mod fault;
 pub mod finish;
 pub mod labels;
 pub mod materials;
+mod measured;
 pub mod parts;
 mod photo;
 mod pictures;
@@ -212,6 +213,9 @@ fn build_scene(
     plan.findings.extend(seen.findings);
     if let Some(photo) = &plan.photo {
         photo.write(folder, &plan.views[0], entry.exposure)?;
+    }
+    if let Some(measured) = plan.measured.take() {
+        plan.findings.extend(measured.write(&entry.id, folder, &plan.views[0])?);
     }
     for (view, unseen_share) in plan.views.iter_mut().zip(seen.unseen_shares) {
         view.wide.iter_mut().for_each(|wide| wide.unseen_share = unseen_share);

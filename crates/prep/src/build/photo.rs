@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
-use mateval_dataset::camera::Camera;
+use glam::DVec2;
+use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
 use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::lens::Lens;
 use mateval_dataset::{Finding, Severity};
 use mateval_files::FileError;
-use mateval_files::source_folder::SourceFolder;
+use mateval_files::source_folder::{FileFault, LookedFor, SourceFolder};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::Encoding;
 use mateval_image::{LinearRgb, Picture};
-use mateval_sources::source_scene::SourceScene;
+use mateval_sources::source_scene::{CapturedPhoto, SourceScene};
 
 use super::fault::{BuildFault, PhotoFault};
 use crate::error::PrepError;
@@ -43,13 +45,20 @@ pub(super) fn read_photo(
     source: &Path,
     scene: &mut SourceScene,
 ) -> Result<Option<ScenePhoto>, PrepError> {
-    let Some(path) = &entry.photo else { return Ok(None) };
-    let root = entry.root(source);
-    let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
-    let photo = photo_of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
-    let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault)))?;
-    scene.read.files.extend(folder.into_files());
-    scene.read.files.hashes.dedup();
+    let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
+    let photo = match (&scene.captured, &entry.photo) {
+        (Some(captured), _) => captured_photo(captured, &scene.camera, entry.exposure).map_err(fault)?,
+        (None, Some(path)) => {
+            let root = entry.root(source);
+            let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
+            let photo = photo_of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
+            let photo = photo.map_err(fault)?;
+            scene.read.files.extend(folder.into_files());
+            scene.read.files.hashes.dedup();
+            photo
+        }
+        (None, None) => return Ok(None),
+    };
     if photo.transparent_share > 0.0 {
         let message = format!("{:.1} % of its pixels have an alpha below 1", 100.0 * photo.transparent_share);
         let action = "used their colours as they are stored";
@@ -60,21 +69,77 @@ pub(super) fn read_photo(
     Ok(Some(photo))
 }
 
+/// Reads the photo at `path` in the folder `root`, whose camera has this lens. Returns also the file with its hash.
+pub(super) fn read_captured(root: &Path, path: &str, lens: Lens) -> Result<(CapturedPhoto, LookedFor), PhotoFault> {
+    let unreadable = |error| PhotoFault::File(FileFault { code: "unreadable_file", message: format!("{error}") });
+    let mut folder = SourceFolder::new(root, MAX_PHOTO_BYTES).map_err(unreadable)?;
+    let (file, photo) = read_file(&mut folder, path)?;
+    let found = [photo.width() as u32, photo.height() as u32];
+    let stated = [lens.width, lens.height];
+    if stated != [0, 0] && stated != found {
+        return Err(PhotoFault::OtherSize { file, found, stated });
+    }
+    let [width, height] = found;
+    Ok((CapturedPhoto { file, photo, lens: Lens { width, height, ..lens } }, folder.into_files()))
+}
+
+/// The camera's picture of `size` that shows the photo without distortion.
+pub(super) fn pinhole(captured: &CapturedPhoto, size: [u32; 2]) -> Result<Intrinsics, PhotoFault> {
+    let CapturedPhoto { file, lens, .. } = captured;
+    let found = [lens.width, lens.height];
+    if !fits(found, size) {
+        return Err(PhotoFault::Size { file: file.clone(), found, expected: size });
+    }
+    let fault = || PhotoFault::Lens { file: file.clone(), k: [lens.k1, lens.k2, lens.p1, lens.p2] };
+    lens.undistorted(size[0], size[1]).ok_or_else(fault)
+}
+
+/// The photo of a captured room, undistorted to the camera's picture.
+fn captured_photo(captured: &CapturedPhoto, camera: &Camera, exposure: f64) -> Result<ScenePhoto, PhotoFault> {
+    let CapturedPhoto { file, photo, lens } = captured;
+    let Intrinsics { width, height, .. } = camera.intrinsics;
+    let (columns, rows) = (width as usize, height as usize);
+    let picture = match lens.is_distorted() {
+        false => photo.resized(columns, rows),
+        true => photo.resampled(columns, rows, |place| {
+            lens.place(camera.intrinsics.direction(DVec2::from_array(place))).to_array()
+        }),
+    };
+    scene_photo(file.clone(), photo, picture, Some(*lens), exposure)
+}
+
+fn read_file(folder: &mut SourceFolder, path: &str) -> Result<(String, PhotoFile), PhotoFault> {
+    let file = SourceFolder::relative(path)?;
+    let bytes = folder.read(&file)?;
+    let photo = PhotoFile::of_bytes(Path::new(&file), bytes)?;
+    Ok((file, photo))
+}
+
 fn photo_of_file(
     folder: &mut SourceFolder,
     path: &str,
     camera: &Camera,
     exposure: f64,
 ) -> Result<ScenePhoto, PhotoFault> {
-    let file = SourceFolder::relative(path)?;
-    let bytes = folder.read(&file)?;
-    let photo = PhotoFile::of_bytes(Path::new(&file), bytes)?;
+    let (file, photo) = read_file(folder, path)?;
     let found = [photo.width() as u32, photo.height() as u32];
     let expected = [camera.intrinsics.width, camera.intrinsics.height];
     if !fits(found, expected) {
         return Err(PhotoFault::Size { file, found, expected });
     }
     let picture = photo.resized(expected[0] as usize, expected[1] as usize);
+    scene_photo(file, &photo, picture, None, exposure)
+}
+
+/// The photo whose values, at the size of the camera's picture, are `picture`.
+fn scene_photo(
+    file: String,
+    photo: &PhotoFile,
+    picture: Picture<LinearRgb>,
+    lens: Option<Lens>,
+    exposure: f64,
+) -> Result<ScenePhoto, PhotoFault> {
+    let size = [photo.width() as u32, photo.height() as u32];
     let (encoding, picture) = match photo.encoding() {
         Encoding::Linear => (PhotoEncoding::Linear, picture),
         Encoding::Srgb => {
@@ -87,7 +152,7 @@ fn photo_of_file(
         return Err(PhotoFault::Black { file, largest, exposure });
     }
     let transparent_share = photo.transparent_share();
-    Ok(ScenePhoto { listed: Photo { file, size: found, encoding }, picture, transparent_share })
+    Ok(ScenePhoto { listed: Photo { file, size, encoding, lens }, picture, transparent_share })
 }
 
 /// Whether a photo is at least as large as the camera's picture and, reduced to its width, less than half a row higher
@@ -109,7 +174,6 @@ impl ScenePhoto {
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
-    use mateval_dataset::camera::Intrinsics;
 
     use super::*;
 

@@ -15,6 +15,7 @@ use mateval_tracer::World;
 
 use super::fault::BuildFault;
 use super::labels::{MAX_LABEL_BYTES, read_labels};
+use super::measured::{SceneRegions, read_regions};
 use super::parts::{InstanceEntry, PartEntry, PartSplit, list_instances};
 use super::photo::{ScenePhoto, read_photo};
 use super::source::views_of;
@@ -41,6 +42,8 @@ pub(super) struct Plan {
     pub(super) views: Vec<View>,
     /// The input picture, where it is not rendered.
     pub(super) photo: Option<ScenePhoto>,
+    /// The measured colours of a captured scene.
+    pub(super) measured: Option<SceneRegions>,
     /// What is public of a redressed scene.
     pub(super) redressed: Option<Redressed>,
     pub(super) findings: Vec<Finding>,
@@ -77,7 +80,8 @@ pub(super) fn make_plan(
     let part_splits = part_splits(entry, source, &instances, own, &mut source_scene.read)?;
     let photo = read_photo(entry, source, &mut source_scene)?;
     let mut views = views_of(recipe, source_scene.camera);
-    let SourceScene { kind, states_roughness, states_metallic, house, file, read, camera } = source_scene;
+    let measured = read_regions(entry, source, &mut source_scene, &views[0])?;
+    let SourceScene { kind, states_roughness, states_metallic, house, file, read, camera, captured: _ } = source_scene;
     let mut findings = read.findings;
     let (scene, source_materials) = match recipe.materials {
         TrueMaterials::Source => (read.scene, None),
@@ -116,6 +120,7 @@ pub(super) fn make_plan(
         classes,
         views,
         photo,
+        measured,
         redressed: None,
         findings,
         file,

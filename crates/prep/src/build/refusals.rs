@@ -149,6 +149,9 @@ fn folders_below(root: &Path) -> Vec<PathBuf> {
 
 /// The finding about base colours that are not stated, if any are. Fails where they cover too much of the picture.
 pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, BuildFault> {
+    if !plan.source.kind.states_materials() {
+        return Ok(None);
+    }
     let all: usize = seen.input_pixels.iter().sum();
     let is_unstated = |at: &usize| !plan.origins[*at].stated.base_color && seen.input_pixels[*at] > 0;
     let mut unstated: Vec<usize> = (0..plan.instances.len()).filter(is_unstated).collect();

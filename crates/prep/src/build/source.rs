@@ -14,6 +14,7 @@ use mateval_dataset::{Finding, Progress, Report, Severity, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
 use mateval_sources::blend::{BakeFault, bake};
+use mateval_sources::capture::{self, Capture, CaptureFiles};
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, Missing, SourceScene};
@@ -21,9 +22,12 @@ use mateval_sources::{bitterli, gltf};
 use mateval_tracer::World;
 
 use super::fault::{BuildFault, above_notes};
+use super::photo::{pinhole, read_captured};
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
-use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
+use crate::recipe::{
+    CapturedRoom, Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource,
+};
 use crate::render::BlenderOptions;
 
 /// Width and height in pixels where neither the recipe nor a glTF with a camera states them.
@@ -56,6 +60,7 @@ pub(super) fn read_source(
         RecipeSource::Front3d(room) => front3d_scene(recipe, entry, root, room),
         RecipeSource::Gltf(file) => gltf_scene(recipe, entry, &root.join(file), file),
         RecipeSource::Blend(file) => blend_scene(recipe, entry, root, file, baking),
+        RecipeSource::Capture(room) => captured_scene(recipe, entry, root, room),
     }
 }
 
@@ -105,7 +110,41 @@ fn scene_of_file(
         file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         read,
         camera,
+        captured: None,
     }
+}
+
+/// The scene of a captured room, seen by the camera of its input photo.
+fn captured_scene(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    root: &Path,
+    room: &CapturedRoom,
+) -> Result<SourceScene, PrepError> {
+    let path = |path: &Path| path.to_string_lossy().into_owned();
+    let files = CaptureFiles {
+        root: root.to_owned(),
+        mesh: path(&room.mesh),
+        cameras: path(&room.cameras),
+        photos: path(&room.photos),
+        input: room.input.clone(),
+        labels: room.labels.as_deref().map(path),
+        scale: room.scale,
+        up: DVec3::from_array(room.up),
+        architecture: room.architecture.clone(),
+    };
+    let Capture { mut read, camera, photo } = capture::read(&files)?;
+    let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
+    let (captured, file) = read_captured(root, &photo, camera.lens).map_err(fault)?;
+    read.files.extend(file);
+    let own_size = [captured.lens.width, captured.lens.height];
+    let size = picture_size(recipe, entry, own_size).map_err(PrepError::scene(&entry.id))?;
+    let intrinsics = pinhole(&captured, size).map_err(fault)?;
+    let camera = Camera::from_rotation(camera.rotation, camera.position, intrinsics);
+    // Photos of one room are in one folder, which names the house without `house`.
+    let house = room.mesh.parent().and_then(Path::file_name);
+    let scene = scene_of_file(read, SourceKind::Capture, house, entry, &room.mesh, camera);
+    Ok(SourceScene { file: files.mesh, captured: Some(captured), ..scene })
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.

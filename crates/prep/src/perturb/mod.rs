@@ -144,6 +144,7 @@ fn write_scene(
     amount: Amount,
     seed: u64,
 ) -> Result<PerturbedScene, PrepError> {
+    scene.check_materials_known()?;
     // The true scene, and the displacement of each instance.
     let mut reference = reference::read(from)?;
     let mut faults = Faults::default();

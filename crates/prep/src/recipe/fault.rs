@@ -66,7 +66,7 @@ impl ValueFault {
 pub enum RecipeSceneFault {
     #[error(transparent)]
     Value(#[from] ValueFault),
-    #[error("expected exactly one of the keys `bitterli`, `front3d`, `gltf`, `blend`")]
+    #[error("expected exactly one of the keys `bitterli`, `front3d`, `gltf`, `blend`, `capture`")]
     NotOneSource,
     #[error("a room needs a camera, as in `camera = {{ seed = 1 }}`")]
     NoCamera,
@@ -87,6 +87,8 @@ pub enum RecipeSceneFault {
     /// A scene has the id of a twin of another one.
     #[error("it has the id of the twin '{lighting}' of scene '{of}'; choose another id")]
     TwinId { of: SceneId, lighting: LightingName },
+    #[error("`{key}` does not go with `capture`, whose camera, photo and materials are those of a real room")]
+    NotOfCaptures { key: &'static str },
     /// The scene cannot be redressed.
     #[error(transparent)]
     Secret(#[from] SecretFault),

@@ -24,6 +24,8 @@ pub struct RecipeScene {
     pub gltf: Option<PathBuf>,
     /// A Blender file, whose materials Blender bakes.
     pub blend: Option<PathBuf>,
+    /// A real room that was scanned and photographed.
+    pub capture: Option<CapturedRoom>,
     /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder, the house's uid, or
     /// the glTF's name.
     pub house: Option<String>,
@@ -70,6 +72,58 @@ pub enum Availability {
     Public,
     /// Nobody else has them.
     Private,
+}
+
+/// A real room: its scan, the cameras and photos that were taken of it, and the colours that were measured in it. Mesh
+/// and cameras share one world.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CapturedRoom {
+    /// A `.ply`, `.obj`, `.glb` or `.gltf` file.
+    pub mesh: PathBuf,
+    /// A file or a folder of cameras.
+    pub cameras: PathBuf,
+    /// The folder of the photos.
+    pub photos: PathBuf,
+    /// The name of the input photo, with or without its ending.
+    pub input: String,
+    /// The measured colours: a file of ours, or a table of MAW's.
+    pub measured: PathBuf,
+    /// A NumPy file with the number of an instance for each triangle of the mesh.
+    pub labels: Option<PathBuf>,
+    /// Metres for each unit of mesh and cameras.
+    #[serde(default = "default_scale")]
+    pub scale: f64,
+    /// The direction up in the world of mesh and cameras.
+    #[serde(default = "default_up")]
+    pub up: [f64; 3],
+    /// The names of the instances that belong to the building.
+    #[serde(default)]
+    pub architecture: Vec<String>,
+}
+
+fn default_scale() -> f64 {
+    1.0
+}
+
+fn default_up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+impl CapturedRoom {
+    /// Its paths with their keys, and whether each must be a folder.
+    fn paths(&self) -> impl Iterator<Item = (&'static str, &Path, bool)> {
+        // Of cameras, COLMAP and Objects With Lighting have a folder, all others a file with an ending.
+        let has_ending = self.cameras.extension().is_some();
+        let labels = self.labels.as_deref().map(|labels| ("labels", labels, false));
+        let all: [(&'static str, &Path, bool); 4] = [
+            ("mesh", &self.mesh, false),
+            ("cameras", &self.cameras, !has_ending),
+            ("photos", &self.photos, true),
+            ("measured", &self.measured, false),
+        ];
+        all.into_iter().chain(labels)
+    }
 }
 
 /// What a scene is redressed with. Both paths must lead out of the folder that the recipe's paths are relative to.
@@ -134,6 +188,7 @@ pub enum RecipeSource<'a> {
     Front3d(&'a Front3dRoom),
     Gltf(&'a Path),
     Blend(&'a Path),
+    Capture(&'a CapturedRoom),
 }
 
 /// A path that a scene's source needs.
@@ -167,7 +222,8 @@ impl RecipeScene {
         let front3d = self.front3d.as_ref().map(RecipeSource::Front3d);
         let gltf = self.gltf.as_deref().map(RecipeSource::Gltf);
         let blend = self.blend.as_deref().map(RecipeSource::Blend);
-        let mut named = [bitterli, front3d, gltf, blend].into_iter().flatten();
+        let capture = self.capture.as_ref().map(RecipeSource::Capture);
+        let mut named = [bitterli, front3d, gltf, blend, capture].into_iter().flatten();
         match (named.next(), named.next()) {
             (Some(source), None) => Ok(source),
             _ => Err(RecipeSceneFault::NotOneSource),
@@ -200,11 +256,19 @@ impl RecipeScene {
             paths.extend(room.textures.as_deref().map(|textures| path("textures", textures, true)));
             paths.extend(room.cameras.as_deref().map(|cameras| path("cameras", cameras, false)));
         }
+        if let Some(room) = &self.capture {
+            paths.extend(room.paths().map(|(key, file, is_folder)| path(key, file, is_folder)));
+        }
         paths
     }
 
     /// The paths that `scene.json` records, with their keys. They must be relative to the folder of the recipe's paths.
     pub(crate) fn recorded_paths(&mut self) -> Vec<(&'static str, &mut PathBuf)> {
+        if let Some(room) = &mut self.capture {
+            let files = [("mesh", &mut room.mesh), ("cameras", &mut room.cameras), ("photos", &mut room.photos)];
+            let labels = room.labels.as_mut().map(|labels| ("labels", labels));
+            return files.into_iter().chain([("measured", &mut room.measured)]).chain(labels).collect();
+        }
         let Some(room) = &mut self.front3d else { return Vec::new() };
         let optional = [("textures", room.textures.as_mut()), ("cameras", room.cameras.as_mut())];
         let mut paths = vec![("house", &mut room.house), ("models", &mut room.models)];
@@ -231,6 +295,9 @@ impl RecipeScene {
             own.push(RecipeSceneFault::RedressedPhoto);
         }
         self.check_twins(&mut own);
+        if let Some(room) = &self.capture {
+            self.check_capture(room, &mut own);
+        }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             own.push(ValueFault::new("exposure", self.exposure.to_string(), "a number above 0").into());
         }
@@ -239,6 +306,21 @@ impl RecipeScene {
             own.push(RecipeSceneFault::CameraRange);
         }
         faults.extend(own.into_iter().map(|fault| RecipeFault::Scene { scene: self.id.clone(), fault }));
+    }
+
+    /// A captured room has its own camera and photo, and no materials that others could replace.
+    fn check_capture(&self, room: &CapturedRoom, faults: &mut Vec<RecipeSceneFault>) {
+        let others =
+            [("camera", self.camera.is_some()), ("photo", self.photo.is_some()), ("redress", self.redress.is_some())];
+        let stated = others.into_iter().filter(|(_, is_stated)| *is_stated);
+        faults.extend(stated.map(|(key, _)| RecipeSceneFault::NotOfCaptures { key }));
+        if !(room.scale > 0.0 && room.scale.is_finite()) {
+            faults.push(ValueFault::new("scale", room.scale.to_string(), "a number above 0").into());
+        }
+        let length = room.up.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
+        if !(length > 1e-6 && length.is_finite()) {
+            faults.push(ValueFault::new("up", format!("{:?}", room.up), "a direction, as in [0, 0, 1]").into());
+        }
     }
 
     /// The scene has one source, and a camera that the source can provide.

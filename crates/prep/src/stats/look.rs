@@ -64,7 +64,7 @@ impl Sums {
 pub fn look(dataset: &Dataset) -> Result<Option<LookStats>, PrepError> {
     let mut sums = [(); 5].map(|()| Sums::default());
     let mut views = 0;
-    for scene in &dataset.scenes {
+    for scene in dataset.scenes.iter().filter(|scene| scene.source.kind.states_materials()) {
         let (folder, Some(view)) = (dataset.folder(&scene.id), scene.views.first()) else { continue };
         let albedo = folder.truth_view(&view.id).join("albedo.exr");
         if !albedo.exists() {

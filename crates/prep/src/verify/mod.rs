@@ -181,6 +181,7 @@ fn check_scene(root: &Path, folder: &SceneFolder, dataset: &DatasetFile, id: &st
             check_source_materials(folder, reference.materials.len(), faults);
             check_material_classes(folder, &scene, faults);
             scene::check_materials(folder, &scene, faults);
+            scene::check_measured(folder, &scene, faults);
             if !scene::matches_reference(&reference, &meshes, faults) {
                 return;
             }

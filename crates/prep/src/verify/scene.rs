@@ -12,10 +12,12 @@ use mateval_dataset::dataset::{FORMAT, Part, SceneFile, View, WideView};
 use mateval_dataset::glb::GlbNode;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
+use mateval_dataset::measured::{MeasuredFile, color_fault};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_dataset::submission::Map;
 use mateval_dataset::{Camera, DatasetError, ViewId, json};
 use mateval_image::Wrap;
+use mateval_image::png_io;
 use mateval_image::texture_io::{Encoding, read_texture};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
@@ -220,6 +222,59 @@ pub(super) fn check_materials(folder: &SceneFolder, scene: &SceneFile, faults: &
                 let message = format!("{}x{} texels, expected {size}x{size}", picture.width(), picture.height());
                 faults.add("wrong_size", &file, "", message);
             }
+        }
+    }
+}
+
+/// Checks the measured colours of a captured scene, and that each region of a view is one of the scene's.
+pub(super) fn check_measured(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
+    const FILE: &str = "ground_truth/measured.json";
+    let (exists, is_captured) = (folder.measured().exists(), !scene.source.kind.states_materials());
+    if !exists || !is_captured {
+        if exists != is_captured {
+            let message = "a scene has this file if and only if it is captured";
+            faults.add("unexpected_measured", FILE, "", message);
+        }
+        return;
+    }
+    check_schema::<MeasuredFile>(folder.path(), FILE, faults);
+    let Some(MeasuredFile { regions, .. }) = faults.read(FILE, json::read::<MeasuredFile>(&folder.measured())) else {
+        return;
+    };
+    for (at, region) in regions.iter().enumerate() {
+        if let Some(fault) = color_fault(&region.color, region.standard_error.as_ref()) {
+            faults.add("bad_color", FILE, format!("/regions/{at}"), fault);
+        }
+        if usize::from(region.index) != at + 1 {
+            faults.add("bad_index", FILE, format!("/regions/{at}/index"), format!("expected {}", at + 1));
+        }
+        if scene.view(region.view.as_str()).is_none() {
+            let message = format!("the scene has no view '{}'", region.view);
+            faults.add("dangling_reference", FILE, format!("/regions/{at}/view"), message);
+        }
+    }
+    for view in scene.views.iter().filter(|view| regions.iter().any(|region| region.view == view.id)) {
+        let file = format!("ground_truth/views/{}/measured.png", view.id);
+        let picture = faults.read(&file, png_io::read_ids(&folder.measured_regions(&view.id)));
+        let valid = png_io::read_mask(&folder.view(&view.id).join("valid.png"));
+        // What is wrong with valid.png is reported with the other pictures.
+        let (Some(picture), Ok(valid)) = (picture, valid) else { continue };
+        if (picture.width(), picture.height()) != (valid.width(), valid.height()) {
+            let (width, height) = (picture.width(), picture.height());
+            let message = format!("{width}x{height} pixels, expected {}x{}", valid.width(), valid.height());
+            faults.add("wrong_size", &file, "", message);
+            continue;
+        }
+        let is_own = |index: u16| regions.iter().any(|region| region.index == index && region.view == view.id);
+        let wrong = picture
+            .pixels()
+            .iter()
+            .zip(valid.pixels())
+            .filter(|(index, valid)| **index > 0 && !(**valid && is_own(**index)));
+        let count = wrong.count();
+        if count > 0 {
+            let message = format!("{count} pixels show a region that the scene does not list, or are not valid");
+            faults.add("wrong_region", &file, "", message);
         }
     }
 }

@@ -531,6 +531,7 @@ mod tests {
             pictures: Vec::new(),
             texels: Vec::new(),
             instances,
+            measured: Vec::new(),
         };
         let shares = worst_under_lights(&scores, &SceneId::new("s").unwrap());
         assert_eq!(shares.iter().map(|share| share.instance.as_str()).collect::<Vec<_>>(), ["a", "b"]);

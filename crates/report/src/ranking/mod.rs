@@ -435,6 +435,7 @@ pub(crate) mod tests {
             pictures,
             texels: Vec::new(),
             instances: Vec::new(),
+            measured: Vec::new(),
         };
         ResultFile {
             format: RESULT_FORMAT.to_owned(),

@@ -100,6 +100,7 @@ fn source_title(kind: SourceKind) -> &'static str {
         SourceKind::Bitterli => "Bitterli",
         SourceKind::Gltf => "glTF",
         SourceKind::Blend => "Blender",
+        SourceKind::Capture => "Captures",
     }
 }
 

@@ -31,6 +31,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
         pictures: Vec::new(),
         texels: Vec::new(),
         instances: Vec::new(),
+        measured: Vec::new(),
     };
     ResultFile {
         format: RESULT_FORMAT.to_owned(),

@@ -54,6 +54,7 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
             missing: missing(house, room),
         },
         camera: views[0],
+        captured: None,
     }
 }
 

@@ -1,0 +1,529 @@
+//! A room of the sample passed off as a capture: its mesh as a PLY without uv, its photo as a 16-bit PNG, its camera in
+//! every format, and measured colours that are means of the ordinary albedo picture. Scores are those of the ordinary
+//! path.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use mateval_baselines::estimate_source::EstimateSource;
+use mateval_baselines::nn::{self, NnOptions};
+use mateval_baselines::{bounds, submission};
+use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::lens::Lens;
+use mateval_dataset::measured::{MEASUREMENTS_FORMAT, MeasuredArea, MeasuredFile, MeasurementsFile};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Camera, SceneId, glb, json};
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_eval::shown::scene_albedo;
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
+use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
+use mateval_metrics::measured::color_difference;
+use mateval_prep::build::{BuildOptions, build};
+use mateval_prep::error::PrepError;
+use mateval_testkit::kept_folder;
+use mateval_testkit::sample_dataset;
+
+/// The formats of cameras, and the path of each in the source.
+const FORMATS: [(&str, &str); 6] = [
+    ("nerfstudio", "transforms.json"),
+    ("colmap_text", "text"),
+    ("colmap_binary", "binary"),
+    ("idr", "cameras_sphere.npz"),
+    ("fipt", "cam.txt"),
+    ("lighting", "lighting"),
+];
+const SCENE: &str = "living";
+/// The distortion of the photo in the folder `distorted`.
+const K1: f64 = -0.2;
+
+fn ordinary() -> (&'static Dataset, &'static SceneFile) {
+    let dataset = sample_dataset::dataset();
+    (dataset, dataset.scene(&SceneId::new(SCENE).unwrap()).unwrap())
+}
+
+fn input_view() -> &'static View {
+    &ordinary().1.views[0]
+}
+
+/// The source `capture`, with every format of cameras.
+static SOURCE: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("capture_source");
+    let (dataset, scene) = ordinary();
+    write_mesh(&folder.join("mesh.ply"));
+    let photo = exr_io::read_linear(&dataset.folder(&scene.id).view(&input_view().id).join("rgb.exr")).unwrap();
+    let exposed = photo.map(|LinearRgb(rgb)| rgb.map(|v| (f64::from(v) * scene.exposure) as f32));
+    write_photos(&folder.join("images"), &exposed.map(words));
+    let lens = lens(K1);
+    let bent = Picture::from_fn(exposed.width(), exposed.height(), |x, y| {
+        undistorted(&lens, x, y).map_or([0; 3], |place| words(bilinear(&exposed, place)))
+    });
+    write_photos(&folder.join("distorted"), &bent);
+    write_cameras(&folder);
+    write_measurements(&folder);
+    folder
+});
+
+fn words(rgb: [f32; 3]) -> [u16; 3] {
+    rgb.map(|v| word_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
+}
+
+/// A photo before the input photo, so that the latter's number is 1, and the input photo.
+fn write_photos(folder: &Path, photo: &Picture<[u16; 3]>) {
+    std::fs::create_dir_all(folder).unwrap();
+    png_io::write_rgb_words(&folder.join("image_0000.png"), &photo.map(|_| [9; 3])).unwrap();
+    png_io::write_rgb_words(&folder.join("image_0001.png"), photo).unwrap();
+}
+
+fn lens(k1: f64) -> Lens {
+    Lens { k1, ..Lens::pinhole(&input_view().camera.intrinsics) }
+}
+
+/// The place in the pinhole's picture of what a distorted photo shows in the middle of a pixel.
+/// None beyond the fold of the lens.
+fn undistorted(lens: &Lens, x: usize, y: usize) -> Option<DVec2> {
+    let direction = lens.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5))?;
+    Some(DVec2::new(lens.cx + lens.fx * direction.x, lens.cy + lens.fy * direction.y))
+}
+
+fn bilinear(picture: &Picture<[f32; 3]>, place: DVec2) -> [f32; 3] {
+    let at = |value: f64, size: usize| {
+        let value = (value - 0.5).clamp(0.0, size as f64 - 1.0);
+        let first = (value as usize).min(size - 2);
+        (first, (value - first as f64) as f32)
+    };
+    let ((x, fx), (y, fy)) = (at(place.x, picture.width()), at(place.y, picture.height()));
+    let row = |y: usize| {
+        let (a, b) = (picture.get(x, y), picture.get(x + 1, y));
+        [0, 1, 2].map(|c| a[c] + fx * (b[c] - a[c]))
+    };
+    let (a, b) = (row(y), row(y + 1));
+    [0, 1, 2].map(|c| a[c] + fy * (b[c] - a[c]))
+}
+
+/// All triangles of the room; the label of a face is the index of its instance.
+fn write_mesh(path: &Path) {
+    let (dataset, scene) = ordinary();
+    let nodes = glb::read(&dataset.folder(&scene.id).instances()).unwrap();
+    let (mut vertices, mut faces, mut count) = (String::new(), String::new(), [0_usize; 2]);
+    for (node, instance) in nodes.iter().zip(&scene.instances) {
+        assert_eq!(node.name, instance.id.as_str());
+        for corner in &node.mesh.positions {
+            writeln!(vertices, "{:?} {:?} {:?}", corner.x, corner.y, corner.z).unwrap();
+        }
+        for [a, b, c] in &node.mesh.triangles {
+            let [a, b, c] = [a, b, c].map(|corner| *corner as usize + count[0]);
+            writeln!(faces, "3 {a} {b} {c} {}", instance.index.0).unwrap();
+        }
+        count = [count[0] + node.mesh.positions.len(), count[1] + node.mesh.triangles.len()];
+    }
+    let [positions, triangles] = count;
+    let head = format!(
+        "ply\nformat ascii 1.0\nelement vertex {positions}\nproperty float x\nproperty float y\nproperty float z\nelement face \
+         {triangles}\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n"
+    );
+    std::fs::write(path, head + &vertices + &faces).unwrap();
+}
+
+/// The input camera as the second of two, in all formats; the first looks the other way.
+fn write_cameras(folder: &Path) {
+    let camera = input_view().camera;
+    let back = Camera::from_rotation(
+        camera.rotation() * DMat3::from_rotation_y(std::f64::consts::PI),
+        camera.position(),
+        camera.intrinsics,
+    );
+    let (k, cameras) = (camera.intrinsics, [back, camera]);
+    // To OpenCV's axes, as COLMAP, IDR and Objects With Lighting have them.
+    let to_opencv = |camera: &Camera| {
+        let rotation = (camera.rotation() * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0))).transpose();
+        (rotation, -(rotation * camera.position()))
+    };
+    let name = |at: usize| format!("image_{at:04}.png");
+    let frames: Vec<serde_json::Value> = (0..2)
+        .map(|at| {
+            serde_json::json!({ "file_path": format!("images/{}", name(at)),
+            "transform_matrix": cameras[at].world_from_camera })
+        })
+        .collect();
+    for (file, k1) in [("transforms.json", 0.0), ("distorted.json", K1)] {
+        let transforms = serde_json::json!({ "camera_model": "OPENCV", "fl_x": k.fx, "fl_y": k.fy, "cx": k.cx,
+            "cy": k.cy, "w": k.width, "h": k.height, "k1": k1, "frames": frames });
+        std::fs::write(folder.join(file), transforms.to_string()).unwrap();
+    }
+    for name in ["text", "binary", "lighting"] {
+        std::fs::create_dir_all(folder.join(name)).unwrap();
+    }
+    let numbers = [k.fx, k.fy, k.cx, k.cy];
+    let lens = format!("1 PINHOLE {} {} {} {} {} {}\n", k.width, k.height, k.fx, k.fy, k.cx, k.cy);
+    std::fs::write(folder.join("text/cameras.txt"), lens).unwrap();
+    let mut bytes = [1_u64.to_le_bytes().to_vec(), 1_u32.to_le_bytes().to_vec(), 1_i32.to_le_bytes().to_vec()].concat();
+    [k.width, k.height].iter().for_each(|side| bytes.extend(u64::from(*side).to_le_bytes()));
+    numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    std::fs::write(folder.join("binary/cameras.bin"), bytes).unwrap();
+    let (mut images, mut binary) = (String::new(), 2_u64.to_le_bytes().to_vec());
+    let (mut fipt, mut list) = ("2\n".to_owned(), "2\n".to_owned());
+    let mut npz = zip::ZipWriter::new(std::fs::File::create(folder.join("cameras_sphere.npz")).unwrap());
+    for (at, camera) in cameras.iter().enumerate() {
+        let (rotation, t) = to_opencv(camera);
+        let q = DQuat::from_mat3(&rotation);
+        let pose = [q.w, q.x, q.y, q.z, t.x, t.y, t.z];
+        let words = pose.map(|number| number.to_string()).join(" ");
+        writeln!(images, "{} {words} 1 {}\n", at + 1, name(at)).unwrap();
+        binary.extend((at as u32 + 1).to_le_bytes());
+        pose.iter().for_each(|number| binary.extend(number.to_le_bytes()));
+        binary.extend(1_u32.to_le_bytes());
+        binary.extend(format!("{}\0", name(at)).into_bytes());
+        binary.extend(0_u64.to_le_bytes());
+        let place = camera.position();
+        for row in [place, place - camera.rotation().z_axis, camera.rotation().y_axis] {
+            writeln!(fipt, "{} {} {}", row.x, row.y, row.z).unwrap();
+        }
+        let matrix = DMat3::from_cols(DVec3::X * k.fx, DVec3::Y * k.fy, DVec3::new(k.cx, k.cy, 1.0));
+        let rows = |matrix: DMat3| -> String {
+            (0..3).map(|at| matrix.row(at)).map(|row| format!("{} {} {}\n", row.x, row.y, row.z)).collect()
+        };
+        list += &rows(matrix);
+        let size = format!("{} {} 3\n", k.width, k.height);
+        let lighting = format!("{}{}{} {} {}\n{size}", rows(matrix), rows(rotation), t.x, t.y, t.z);
+        std::fs::write(folder.join(format!("lighting/camera_{at:04}.txt")), lighting).unwrap();
+        let (m, last) = (matrix * rotation, matrix * t);
+        let mut world: Vec<f64> = (0..3).flat_map(|at| [m.row(at).x, m.row(at).y, m.row(at).z, last[at]]).collect();
+        world.extend([0.0, 0.0, 0.0, 1.0]);
+        npz.start_file(format!("world_mat_{at}.npy"), zip::write::SimpleFileOptions::default()).unwrap();
+        npz.write_all(&npy(&world, &[4, 4])).unwrap();
+    }
+    npz.finish().unwrap();
+    std::fs::write(folder.join("text/images.txt"), images).unwrap();
+    std::fs::write(folder.join("binary/images.bin"), binary).unwrap();
+    std::fs::write(folder.join("cam.txt"), fipt).unwrap();
+    std::fs::write(folder.join("K_list.txt"), list).unwrap();
+}
+
+fn npy(numbers: &[f64], shape: &[u64]) -> Vec<u8> {
+    use npyz::WriterBuilder as _;
+    let mut bytes = Vec::new();
+    let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd().unwrap();
+    writer.extend(numbers.iter().copied()).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+/// The instances that fill most of the input view, each a region: its index and its valid pixels.
+fn regions() -> Vec<(u16, Mask)> {
+    let (dataset, scene) = ordinary();
+    let folder = dataset.folder(&scene.id).view(&input_view().id);
+    let instances = png_io::read_ids(&folder.join("instance.png")).unwrap();
+    let valid = png_io::read_mask(&folder.join("valid.png")).unwrap();
+    let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
+    let pixels = instances.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
+    pixels.for_each(|(instance, _)| *counts.entry(*instance).or_default() += 1);
+    let mut largest: Vec<(u16, usize)> = counts.into_iter().collect();
+    largest.sort_by_key(|(index, count)| (std::cmp::Reverse(*count), *index));
+    let mask = |index: u16| {
+        Picture::from_fn(valid.width(), valid.height(), |x, y| valid.get(x, y) && instances.get(x, y) == index)
+    };
+    largest.into_iter().take(5).map(|(index, _)| (index, mask(index))).collect()
+}
+
+fn mean(picture: &Picture<LinearRgb>, mask: &Mask) -> [f64; 3] {
+    let chosen: Vec<[f32; 3]> =
+        picture.pixels().iter().zip(mask.pixels()).filter(|(_, counts)| **counts).map(|(rgb, _)| rgb.0).collect();
+    [0, 1, 2].map(|c| chosen.iter().map(|rgb| f64::from(rgb[c])).sum::<f64>() / chosen.len() as f64)
+}
+
+/// `measured.json` and its mask, and the same for the distorted photo; `maw.csv` with the colours in the same mask.
+fn write_measurements(folder: &Path) {
+    let (dataset, scene) = ordinary();
+    let truth = dataset.folder(&scene.id).truth_view(&input_view().id).join("albedo.exr");
+    let (albedo, regions) = (exr_io::read_linear(&truth).unwrap(), regions());
+    let (width, height) = (albedo.width(), albedo.height());
+    let value = |x: usize, y: usize| {
+        regions.iter().position(|(_, mask)| mask.get(x, y)).map_or(0, |place| 10 * (place as u8 + 1))
+    };
+    png_io::write_grey_bytes(&folder.join("regions.png"), &Picture::from_fn(width, height, value)).unwrap();
+    let bent = Picture::from_fn(width, height, |x, y| {
+        let place = undistorted(&lens(K1), x, y).filter(|place| input_view().camera.holds(*place));
+        place.map_or(0, |place| value(place.x as usize, place.y as usize))
+    });
+    png_io::write_grey_bytes(&folder.join("bent_regions.png"), &bent).unwrap();
+    for (file, mask) in [("measured.json", "regions.png"), ("bent_measured.json", "bent_regions.png")] {
+        let area = |(place, (index, pixels)): (usize, &(u16, Mask))| MeasuredArea {
+            name: index.to_string(),
+            photo: "image_0001.png".to_owned(),
+            mask: mask.to_owned(),
+            value: 10 * (place as u16 + 1),
+            color: mean(&albedo, pixels).map(|v| v.min(1.0)),
+            standard_error: (place == 0).then_some([0.01; 3]),
+        };
+        let areas = regions.iter().enumerate().map(area).collect();
+        let measurements = MeasurementsFile { format: MEASUREMENTS_FORMAT.to_owned(), regions: areas };
+        json::write(&folder.join(file), &measurements).unwrap();
+    }
+    std::fs::write(folder.join("colors.npy"), npy(&[0.25; 15], &[5, 3])).unwrap();
+    std::fs::write(folder.join("maw.csv"), "colors.npy\tregions.png\tval\timage_0001\ta.png\tNone\n").unwrap();
+}
+
+/// The keys of a captured scene, after its id.
+fn entry(id: &str, cameras: &str, more: &str) -> String {
+    let keys = |photos: &str, measured: &str| {
+        format!(
+            "\n[[scene]]\nid = \"{id}\"\n[scene.capture]\nmesh = \"mesh.ply\"\ncameras = \"{cameras}\"\nphotos = \"{photos}\"\n\
+                 input = \"image_0001\"\nmeasured = \"{measured}\"\n{more}\n"
+        )
+    };
+    match id {
+        "distorted" => keys("distorted", "bent_measured.json"),
+        "maw" => keys("images", "maw.csv"),
+        _ => keys("images", "measured.json"),
+    }
+}
+
+fn built(name: &str, entries: &str) -> Result<Dataset, PrepError> {
+    let folder = kept_folder(name);
+    let recipe = folder.join("recipe.toml");
+    let head = "name = \"captures\"\natlas_size = 128\nviews = []\n";
+    let exposure = format!("exposure = {}\n[scene.capture]", ordinary().1.exposure);
+    std::fs::write(&recipe, head.to_owned() + &entries.replace("[scene.capture]", &exposure)).unwrap();
+    let out = folder.join("dataset");
+    let options = BuildOptions {
+        recipe,
+        source: Some(SOURCE.clone()),
+        out: out.clone(),
+        scenes: Vec::new(),
+        force: false,
+        blender: None,
+        atlas_cache: None,
+    };
+    build(&options, "test", &|_| ())?;
+    Ok(Dataset::open(&out).unwrap())
+}
+
+/// A dataset with a scene for each format of cameras, the distorted photo, and MAW's table.
+static CAPTURES: LazyLock<Dataset> = LazyLock::new(|| {
+    let mut entries: String = FORMATS.iter().map(|(id, cameras)| entry(id, cameras, "")).collect();
+    entries += &entry("distorted", "distorted.json", "");
+    entries += &entry("maw", "transforms.json", "");
+    built("captures", &entries).unwrap()
+});
+
+fn scored(dataset: &Dataset, submission: &Path, protocol: &str) -> ResultFile {
+    let [reason, fix] = ["", ""].map(str::to_owned);
+    let lpips = LpipsWeights::Missing { reason, fix };
+    let protocols = vec![Protocol::named(protocol).unwrap()];
+    score(&ScorePlan::new(dataset, vec![submission], protocols, lpips, "test"), &|_| ()).unwrap().remove(0)
+}
+
+/// A submission with one colour for each instance, by the index of the ordinary scene's.
+fn write_painted(dataset: &Dataset, out: &Path, index: impl Fn(&SceneFile, usize) -> usize) {
+    let method = submission::Method::new("painted", "");
+    submission::write(dataset, out, false, &method, |scene, instance, folder| {
+        let at = scene.instances.iter().position(|known| known.id == instance.id).unwrap();
+        let index = index(scene, at) as f32;
+        let color = [0.13 * index % 0.9, 0.29 * index % 0.8, 0.47 * index % 0.7].map(|v| v + 0.1);
+        let picture = Picture::filled(16, 16, color.map(|v| byte_from_unit(srgb_from_linear(v))));
+        png_io::write_rgb_bytes(&folder.join("base_color.png"), &picture).unwrap();
+        Ok(())
+    })
+    .unwrap();
+}
+
+fn captured(result: &ResultFile) -> &ProtocolResult {
+    &result.protocols["capture-1"]
+}
+
+#[test]
+fn every_format_of_cameras_gives_the_ordinary_camera_and_photo() {
+    let (ordinary_dataset, ordinary) = ordinary();
+    let expected = input_view().camera;
+    let shown = |dataset: &Dataset, scene: &SceneFile| {
+        exr_io::read_linear(&dataset.folder(&scene.id).view(&scene.views[0].id).join("rgb.exr")).unwrap()
+    };
+    let photo = shown(ordinary_dataset, ordinary);
+    for (id, _) in FORMATS {
+        let scene = CAPTURES.scene(&SceneId::new(id).unwrap()).unwrap();
+        let found = scene.views[0].camera;
+        assert!(found.matrix().abs_diff_eq(expected.matrix(), 1e-9), "{id}");
+        assert!((found.intrinsics.fx - expected.intrinsics.fx).abs() < 1e-9, "{id}");
+        assert_eq!(scene.instances.len(), ordinary.instances.len());
+        // 16 bits of sRGB; what is brighter than white is clipped.
+        let off = shown(&CAPTURES, scene)
+            .pixels()
+            .iter()
+            .zip(photo.pixels())
+            .map(|(a, b)| {
+                let clipped = b.0.map(|v| (f64::from(v) * ordinary.exposure).min(1.0));
+                (0..3).map(|c| (f64::from(a.0[c]) * scene.exposure - clipped[c]).abs()).fold(0.0, f64::max)
+            })
+            .fold(0.0, f64::max);
+        assert!(off < 1e-4, "{id}: {off}");
+    }
+}
+
+/// Of the same prediction, the regions of the capture have the means of the ordinary albedo picture.
+#[test]
+fn measured_colours_are_compared_with_means_of_the_albedo_picture() {
+    let (dataset, ordinary) = ordinary();
+    let folder = kept_folder("capture_painted");
+    let (of_ordinary, of_captures) = (folder.join("ordinary"), folder.join("captures"));
+    write_painted(dataset, &of_ordinary, |_, at| at + 1);
+    let label =
+        |scene: &SceneFile, at: usize| scene.instances[at].name.strip_prefix("label_").unwrap().parse().unwrap();
+    write_painted(&CAPTURES, &of_captures, label);
+    let albedo = scene_albedo(dataset, ordinary, &[&of_ordinary]).unwrap().remove(0).predicted.remove(0);
+    let result = scored(&CAPTURES, &of_captures, "capture-1");
+    let measured = &captured(&result).measured;
+    let of_whole = measured.iter().filter(|region| region.scene.as_str() != "distorted").count();
+    assert_eq!(of_whole, 5 * (FORMATS.len() + 1));
+    let masks: BTreeMap<String, Mask> = regions().into_iter().map(|(index, mask)| (index.to_string(), mask)).collect();
+    for region in measured.iter().filter(|region| region.scene.as_str() != "maw") {
+        let expected = mean(&albedo, &masks[&region.region]);
+        // A capture's placeholder is flat, so that its pixels are means over 16 places in place of 64, which differ at the
+        // edges of instances. The mask of the distorted photo is drawn in its pixels.
+        let slack = if region.scene.as_str() == "distorted" { 0.04 } else { 3e-3 };
+        let off = (0..3).map(|c| (region.predicted[c] - expected[c]).abs()).fold(0.0, f64::max);
+        assert!(off < slack, "{} {}: {:?} {expected:?}", region.scene, region.region, region.predicted);
+        assert!((region.delta_e - color_difference(region.predicted, region.measured)).abs() < 1e-12);
+        assert_eq!(region.measurement_delta_e.is_some(), region.region == regions()[0].0.to_string());
+    }
+    let key = "measured.input.region_delta_e".parse().unwrap();
+    let of_scene = |id: &str| captured(&result).scenes[&SceneId::new(id).unwrap()][&key];
+    let listed = measured.iter().filter(|region| region.scene.as_str() == "idr").map(|region| region.delta_e);
+    assert!((of_scene("idr") - listed.sum::<f64>() / 5.0).abs() < 1e-12);
+    assert!((of_scene("idr") - of_scene("fipt")).abs() < 1e-3);
+    assert_eq!(captured(&result).summary.len(), 3);
+}
+
+/// The photo is far from the measured colours, which have no light in them, and grey farther than one of the colours.
+#[test]
+fn baselines_run_on_captures_and_the_truth_is_refused() {
+    let folder = kept_folder("capture_baselines");
+    let (grey, photo) = (folder.join("grey"), folder.join("photo"));
+    bounds::write_grey(&CAPTURES, &grey, false).unwrap();
+    nn::write(&CAPTURES, &photo, false, &EstimateSource::Input, &NnOptions::default(), &|_| ()).unwrap();
+    for submission in [&grey, &photo] {
+        let result = scored(&CAPTURES, submission, "capture-1");
+        let key = "measured.input.region_delta_e".parse().unwrap();
+        assert!(captured(&result).summary[&key] > 3.0);
+    }
+    let refused = bounds::write_truth(&CAPTURES, &folder.join("gt"), false).unwrap_err().to_string();
+    assert!(refused.contains("'nerfstudio' is captured"), "{refused}");
+    let by_estimate =
+        nn::write(&CAPTURES, &folder.join("nn"), false, &EstimateSource::Truth, &NnOptions::default(), &|_| ());
+    assert!(by_estimate.unwrap_err().to_string().contains("is captured"));
+}
+
+/// No other protocol has a value for a capture, and `capture-1` has none for another scene.
+#[test]
+fn what_has_no_truth_has_no_value() {
+    let folder = kept_folder("capture_protocols");
+    let (of_captures, of_ordinary) = (folder.join("captures"), folder.join("ordinary"));
+    bounds::write_grey(&CAPTURES, &of_captures, false).unwrap();
+    bounds::write_grey(sample_dataset::dataset(), &of_ordinary, false).unwrap();
+    for (dataset, submission, protocol) in
+        [(&*CAPTURES, &of_captures, "mateval-3"), (sample_dataset::dataset(), &of_ordinary, "capture-1")]
+    {
+        let result = scored(dataset, submission, protocol);
+        let ProtocolResult { summary, pictures, texels, instances, measured, .. } = &result.protocols[protocol];
+        assert!(summary.is_empty() && pictures.is_empty() && texels.is_empty());
+        assert!(instances.is_empty() && measured.is_empty());
+        let notes = result.findings.iter().filter(|finding| finding.code == "other_protocol").count();
+        assert_eq!(notes, dataset.scenes.len());
+    }
+}
+
+#[test]
+fn the_dataset_is_sound_and_changed_measurements_are_found() {
+    let verified = |root: &Path| mateval_prep::verify::verify(root, &|_| ()).unwrap();
+    let sound = verified(&CAPTURES.root);
+    assert!(sound.iter().all(|finding| finding.severity != mateval_dataset::Severity::Error), "{sound:?}");
+    let copy = kept_folder("capture_changed");
+    mateval_testkit::copy_folder(&CAPTURES.root, &copy);
+    let folder = Dataset::open(&copy).unwrap().folder(&SceneId::new("idr").unwrap());
+    let mut file: MeasuredFile = json::read(&folder.measured()).unwrap();
+    file.regions[0].color[0] = 1.5;
+    file.regions.pop();
+    json::write(&folder.measured(), &file).unwrap();
+    let found = verified(&copy);
+    for code in ["bad_color", "wrong_region"] {
+        assert!(found.iter().any(|finding| finding.code == code), "{code}: {found:?}");
+    }
+}
+
+#[test]
+fn captures_that_cannot_be_scored_are_refused_with_the_reason() {
+    let refused = |name: &str, entries: &str, words: &str| {
+        let found = built(name, entries).err().unwrap().to_string();
+        assert!(found.contains(words), "{name}: {found}");
+    };
+    let plain = |more: &str| entry("a", "transforms.json", more);
+    let with = |key: &str, from: &str, to: &str| {
+        plain("").replace(&format!("{key} = \"{from}\""), &format!("{key} = \"{to}\""))
+    };
+    refused("capture_other", &with("input", "image_0001", "image_0000"), "no region is of the photo 'image_0000.png'");
+    refused("capture_none", &with("input", "image_0001", "9"), "no camera took a photo '9'");
+    refused("capture_missing", &with("mesh", "mesh.ply", "none.ply"), "there is no file");
+    refused("capture_kind", &with("mesh", "mesh.ply", "regions.png"), "expected a mesh as .ply");
+    refused("capture_names", &plain("architecture = [\"wall\"]"), "there is no instance 'wall'");
+    refused("capture_scale", &plain("scale = 0.0"), "scale = 0: expected a number above 0");
+    refused("capture_up", &plain("up = [0, 0, 0]"), "expected a direction");
+    let camera = plain("").replace("id = \"a\"", "id = \"a\"\ncamera = { seed = 1 }");
+    refused("capture_camera", &camera, "`camera` does not go with `capture`");
+    // Regions of a picture of another size, and of another photo.
+    let folder = SOURCE.clone();
+    let mut file: MeasurementsFile = json::read(&folder.join("measured.json")).unwrap();
+    png_io::write_grey_bytes(&folder.join("small.png"), &Picture::filled(8, 6, 10)).unwrap();
+    file.regions[0].mask = "small.png".to_owned();
+    json::write(&folder.join("small.json"), &file).unwrap();
+    refused(
+        "capture_small",
+        &with("measured", "measured.json", "small.json"),
+        "'small.png' is 8x6, and the photo 64x48",
+    );
+    file.regions.iter_mut().for_each(|region| region.photo = "image_0000".to_owned());
+    json::write(&folder.join("others.json"), &file).unwrap();
+    refused(
+        "capture_others",
+        &with("measured", "measured.json", "others.json"),
+        "no region is of the photo 'image_0001.png'",
+    );
+}
+
+/// Millimetres give a warning that names the key; stated as `scale`, they are metres again.
+#[test]
+fn a_mesh_of_another_unit_is_noticed() {
+    let mesh = std::fs::read_to_string(SOURCE.join("mesh.ply")).unwrap();
+    let (head, body) = mesh.split_once("end_header\n").unwrap();
+    let scaled = |line: &str| {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words.len() {
+            3 => words.iter().map(|w| (w.parse::<f64>().unwrap() * 1000.0).to_string()).collect::<Vec<_>>().join(" "),
+            _ => line.to_owned(),
+        }
+    };
+    let body: Vec<String> = body.lines().map(scaled).collect();
+    std::fs::write(SOURCE.join("millimetres.ply"), format!("{head}end_header\n{}\n", body.join("\n"))).unwrap();
+    let mut transforms: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(SOURCE.join("transforms.json")).unwrap()).unwrap();
+    for frame in transforms["frames"].as_array_mut().unwrap() {
+        for row in 0..3 {
+            let place = frame["transform_matrix"][row][3].as_f64().unwrap() * 1000.0;
+            frame["transform_matrix"][row][3] = place.into();
+        }
+    }
+    std::fs::write(SOURCE.join("millimetres.json"), transforms.to_string()).unwrap();
+    let plain = |id: &str, more: &str| entry(id, "millimetres.json", more).replace("mesh.ply", "millimetres.ply");
+    let dataset = built("capture_units", &(plain("wrong", "") + &plain("right", "scale = 0.001"))).unwrap();
+    let noticed = |id: &str| {
+        let scene = dataset.scene(&SceneId::new(id).unwrap()).unwrap();
+        scene.findings.iter().any(|finding| finding.code == "mesh_size" && finding.action.contains("`scale`"))
+    };
+    assert!(noticed("wrong") && !noticed("right"));
+    let right = &dataset.scene(&SceneId::new("right").unwrap()).unwrap().views[0];
+    assert!(right.camera.matrix().abs_diff_eq(input_view().camera.matrix(), 1e-9));
+}
