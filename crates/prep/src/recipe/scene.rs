@@ -211,6 +211,7 @@ impl RecipeSource<'_> {
             Self::Front3d(_) => SourceKind::Front3d,
             Self::Gltf(_) => SourceKind::Gltf,
             Self::Blend(_) => SourceKind::Blend,
+            Self::Capture(_) => SourceKind::Capture,
         }
     }
 }
