@@ -18,6 +18,7 @@
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
 //! Of a scene with twins, [`constancy`] then compares the maps of scene and twins with each other.
+//!
 //! A captured scene has no true maps: [`materials::measured`] compares means over regions with measured colours.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means

@@ -465,7 +465,7 @@ fn captures_that_cannot_be_scored_are_refused_with_the_reason() {
     let with = |key: &str, from: &str, to: &str| {
         plain("").replace(&format!("{key} = \"{from}\""), &format!("{key} = \"{to}\""))
     };
-    refused("capture_other", &with("input", "image_0001", "image_0000"), "no region is of the photo 'image_0000.png'");
+    refused("capture_other", &with("input", "image_0001", "image_0000"), "'images/image_0000.png' is black");
     refused("capture_none", &with("input", "image_0001", "9"), "no camera took a photo '9'");
     refused("capture_missing", &with("mesh", "mesh.ply", "none.ply"), "there is no file");
     refused("capture_kind", &with("mesh", "mesh.ply", "regions.png"), "expected a mesh as .ply");

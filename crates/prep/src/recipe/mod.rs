@@ -22,7 +22,8 @@ pub(crate) use fault::RESOLUTION;
 use fault::{RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
 pub(crate) use scene::SourcePath;
 pub use scene::{
-    AppearanceWord, Availability, CapturedRoom, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource, Redress,
+    AppearanceWord, Availability, CapturedRoom, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource,
+    Redress,
 };
 
 /// The name of the recipe in the dataset.

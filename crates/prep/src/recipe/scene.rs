@@ -311,8 +311,12 @@ impl RecipeScene {
 
     /// A captured room has its own camera and photo, and no materials that others could replace.
     fn check_capture(&self, room: &CapturedRoom, faults: &mut Vec<RecipeSceneFault>) {
-        let others =
-            [("camera", self.camera.is_some()), ("photo", self.photo.is_some()), ("redress", self.redress.is_some())];
+        let others = [
+            ("camera", self.camera.is_some()),
+            ("photo", self.photo.is_some()),
+            ("redress", self.redress.is_some()),
+            ("twins", !self.twins.is_empty()),
+        ];
         let stated = others.into_iter().filter(|(_, is_stated)| *is_stated);
         faults.extend(stated.map(|(key, _)| RecipeSceneFault::NotOfCaptures { key }));
         if !(room.scale > 0.0 && room.scale.is_finite()) {
