@@ -208,7 +208,8 @@ fn times(LinearRgb(rgb): LinearRgb, factor: f32) -> LinearRgb {
     LinearRgb(rgb.map(|v| factor * v))
 }
 
-/// Whatever can be decided agrees, which is everything but some checks of the lamp's light.
+/// Whatever can be decided agrees, which is everything but some checks of the lamp's light, and of the light of a group
+/// that single paths of a picture reach.
 #[test]
 fn a_correct_twin_agrees() {
     let page = tempfile::tempdir().unwrap();
@@ -223,7 +224,10 @@ fn a_correct_twin_agrees() {
     let open: Vec<_> = file.checks().filter(|(_, _, check)| check.state != State::Agrees).collect();
     assert!(file.agrees && file.undecided == open.len() && open.len() <= 10, "{open:?}");
     for (_, _, check) in open {
-        assert_eq!((check.picture.as_str(), check.state), ("group_00", State::TooNoisy), "{check}");
+        assert!(
+            ["group_00", "group_02"].contains(&check.picture.as_str()) && check.state == State::TooNoisy,
+            "{check}"
+        );
         assert!(check.to_decide.is_some(), "{check}");
     }
     let scene = &file.scenes[0];

@@ -85,7 +85,17 @@ fn names_of_pieces_come_from_model_info() {
     let rooms = |source: &Path, rules: &str, code: i32| {
         let out = folder.path().join(format!("survey-{rules}-{code}-{}", source == SURVEYED.source));
         run(survey_of(source, &out).args(["--camera-rules", rules])).ends_with(code);
-        json(&out.join("survey.json"))["houses"][0]["rooms"].clone()
+        let mut rooms = json(&out.join("survey.json"))["houses"][0]["rooms"].clone();
+        // These name pieces, and one whose model the list lacks has only the house's name.
+        for room in rooms.as_array_mut().unwrap() {
+            room["intersecting"].take();
+            room["rejections"]
+                .as_array_mut()
+                .unwrap()
+                .iter_mut()
+                .for_each(|rejection| drop(rejection["reason"].take()));
+        }
+        rooms
     };
     for rules in ["blenderproc", "3dlg"] {
         let found = rooms(&source, rules, 0);

@@ -350,6 +350,16 @@ pub struct DatasetId {
     pub withheld: Option<Secrecy>,
 }
 
+impl SceneFile {
+    /// Fails where the true materials are not known, for work that needs them.
+    pub fn check_materials_known(&self) -> Result<(), DatasetError> {
+        match self.source.kind.states_materials() {
+            true => Ok(()),
+            false => Err(DatasetError::Captured { scene: self.id.clone() }),
+        }
+    }
+}
+
 impl DatasetId {
     /// What other files name it by.
     pub fn named(&self) -> DatasetVersion {

@@ -12,12 +12,12 @@ use mateval_light::light_fit::FittedRadiances;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::constancy::Constancy;
-use crate::materials::measured::MeasuredValues;
 use crate::metric::{Metric, PictureKind};
 use crate::protocol::Protocol;
+use crate::result::constancy::Constancy;
 use crate::result::key::{PictureName, Region, ResultKey, Views};
 
+pub mod constancy;
 pub mod key;
 pub mod means;
 
@@ -168,6 +168,29 @@ pub struct InstancePixelErrors {
     /// Mean over those pixels, in the colour space of the protocol's MSE of that picture; for light without render
     /// noise.
     pub mse: f64,
+}
+
+/// What a submission predicts for a region whose colour was measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredValues {
+    /// The scene's id.
+    pub scene: SceneId,
+    /// The view's id.
+    pub view: ViewId,
+    /// The region's name.
+    pub region: String,
+    /// The pixels whose mean `predicted` is.
+    pub pixels: usize,
+    /// The mean predicted base colour, linear Rec. 709.
+    pub predicted: [f64; 3],
+    /// The measured colour, linear Rec. 709.
+    pub measured: [f64; 3],
+    /// CIEDE2000 between both, without any scale.
+    pub delta_e: f64,
+    /// How far the measurement itself may be off, as CIEDE2000; absent where its error is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measurement_delta_e: Option<f64>,
 }
 
 /// The values of one picture over one region.

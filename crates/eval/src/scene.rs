@@ -19,13 +19,12 @@ use crate::error::EvalError;
 use crate::light::difference::base_color_ratio;
 use crate::light::mse::LightMse;
 use crate::light::reference::StoredReference;
-use crate::materials::measured::MeasuredValues;
 use crate::metric::PictureKind;
 use crate::open_scene::ViewSet;
 use crate::pictures_dir::PicturesDir;
 use crate::protocol::Protocol;
 use crate::result::key::{PictureName, Region, ResultKey, Surfaces, Views};
-use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValues};
+use crate::result::{InstancePixelErrors, InstanceTexelErrors, MeasuredValues, PictureValues};
 use crate::truth::ViewTruth;
 
 #[derive(Clone)]

@@ -18,7 +18,7 @@ use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::files::{HashedFile, SubmissionJson, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
-use crate::constancy::{Constancy, Family};
+use crate::constancy::Family;
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::score_light;
@@ -26,6 +26,7 @@ use crate::metric::{LPIPS_NET, Metric, PictureKind};
 use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::pictures_dir::PicturesDir;
 use crate::protocol::{Protocol, Track};
+use crate::result::constancy::Constancy;
 use crate::result::means::{means, summary_noise};
 use crate::result::{
     MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,

@@ -8,7 +8,6 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-use crate::DatasetError;
 use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
@@ -448,14 +447,6 @@ impl SceneFile {
     /// Whether its truth is meant to be a secret: it was redressed, or its source is private.
     pub fn is_secret(&self) -> bool {
         self.redressed.is_some() || self.source.private
-    }
-
-    /// Fails where the true materials are not known, for work that needs them.
-    pub fn check_materials_known(&self) -> Result<(), DatasetError> {
-        match self.source.kind.states_materials() {
-            true => Ok(()),
-            false => Err(DatasetError::Captured { scene: self.id.clone() }),
-        }
     }
 
     pub fn view(&self, id: &str) -> Option<&View> {

@@ -64,7 +64,7 @@ impl FromStr for LightingName {
     type Err = UnknownWord;
 
     fn from_str(word: &str) -> Result<Self, UnknownWord> {
-        let alone = || word.strip_prefix(ALONE)?.parse().ok().map(Self::Alone);
+        let alone = || word.strip_prefix(ALONE)?.parse().ok().filter(|place| *place > 0).map(Self::Alone);
         let known = [Some(Self::WarmCool), alone()];
         // Only the printed form is accepted: `alone_01` is not.
         known.into_iter().flatten().find(|name| name.to_string() == word).ok_or_else(|| UnknownWord {

@@ -10,39 +10,14 @@ use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_metrics::measured::{RegionColors, color_difference, maw_mask, maw_picture, measurement_delta_e};
 use mateval_submission::prediction::PredictedScene;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::materials::pictures::material_pictures;
 use crate::metric::{Measure, Metric, PictureKind};
-use crate::result::PictureValues;
 use crate::result::key::{PictureName, Region};
+use crate::result::{MeasuredValues, PictureValues};
 use crate::scene::{SceneTask, ScoreSheet};
 use crate::truth::sized;
-
-/// What a submission predicts for a region whose colour was measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MeasuredValues {
-    /// The scene's id.
-    pub scene: SceneId,
-    /// The view's id.
-    pub view: ViewId,
-    /// The region's name.
-    pub region: String,
-    /// The pixels whose mean `predicted` is.
-    pub pixels: usize,
-    /// The mean predicted base colour, linear Rec. 709.
-    pub predicted: [f64; 3],
-    /// The measured colour, linear Rec. 709.
-    pub measured: [f64; 3],
-    /// CIEDE2000 between both, without any scale.
-    pub delta_e: f64,
-    /// How far the measurement itself may be off, as CIEDE2000; absent where its error is not known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub measurement_delta_e: Option<f64>,
-}
 
 /// The measured regions of a scene, with the pictures that show them.
 pub(crate) struct Measured {

@@ -79,11 +79,9 @@ pub(super) fn compare(ours: &OurGeometry, theirs: &TheirGeometry) -> Vec<Check> 
     // At silhouettes the two renderers may see different surfaces, which the ids report.
     let inner = away_from_edges(&ours.instance);
     let (width, height) = (ours.valid.width(), ours.valid.height());
-    let is_same = |at: usize| {
-        let pairs = [(&ours.instance, &theirs.instance), (&ours.part, &theirs.part)];
-        let same = |ours: &Picture<u16>, theirs: &Picture<u16>| ours.pixels()[at] == theirs.pixels()[at];
-        pairs.into_iter().all(|(ours, theirs)| theirs.as_ref().is_none_or(|theirs| same(ours, theirs)))
-    };
+    // Not the parts: two sheets of one instance in one plane are seen as one part or the other, and that is a fault.
+    let is_same =
+        |at: usize| theirs.instance.as_ref().is_none_or(|theirs| theirs.pixels()[at] == ours.instance.pixels()[at]);
     let compared = Mask::from_fn(width, height, |x, y| {
         let at = y * width + x;
         ours.valid.get(x, y) && inner[at] && is_same(at)

@@ -118,7 +118,7 @@ mod tests {
 
     use mateval_dataset::json;
     use mateval_dataset::submission::Cost;
-    use mateval_eval::constancy::{Constancy, Deviation};
+    use mateval_eval::result::constancy::{Constancy, Deviation};
     use mateval_eval::result::{ResultFile, TracerCheck};
     use mateval_image::{Picture, png_io};
 

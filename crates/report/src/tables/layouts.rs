@@ -1,7 +1,7 @@
 //! The tables and their columns, and the numbers that cells can hold.
 
-use mateval_eval::constancy::{Constancy, ConstancyMeans};
 use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
+use mateval_eval::result::constancy::{Constancy, ConstancyMeans};
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 
 use crate::titles::Titled;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::{SceneId, SourceKind};
-use mateval_eval::constancy::Constancy;
 use mateval_eval::metric::{Better, Metric, PictureKind};
+use mateval_eval::result::constancy::Constancy;
 use mateval_eval::result::key::{PictureName, ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
 use mateval_metrics::Psnr;

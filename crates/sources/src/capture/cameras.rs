@@ -1,5 +1,4 @@
-//! The cameras of a capture: what all formats state of one, the choice of the format by the files that exist, and
-//! nerfstudio's `transforms.json`.
+//! The cameras of a capture: what all formats state of one, and nerfstudio's `transforms.json`.
 //!
 //! Poses are kept as the rotation and place of a camera that looks along its -Z with +Y up, as OpenGL's and ours do.
 
@@ -7,11 +6,9 @@ use std::path::Path;
 
 use glam::{DMat3, DMat4, DVec3};
 use mateval_dataset::lens::Lens;
-use mateval_files::source_folder::SourceFolder;
-use mateval_files::untrusted::{hint, quoted};
+use mateval_files::untrusted::quoted;
 use serde::Deserialize;
 
-use super::{colmap, matrices};
 use crate::open::{Invalid, check_json};
 
 /// The most cameras of a capture.
@@ -49,69 +46,6 @@ pub(super) struct Cameras {
     pub(super) all: Vec<CapturedCamera>,
     /// A transform that the file says was applied to its poses, and that the mesh must have had too.
     pub(super) is_transformed: bool,
-}
-
-/// Reads the cameras at `path` in the folder: a file, or a folder of several.
-pub(super) fn read(folder: &mut SourceFolder, path: &str) -> Result<Cameras, Invalid> {
-    let inside = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") };
-    let beside = |name: &str| match path.rsplit_once('/') {
-        Some((parent, _)) => format!("{parent}/{name}"),
-        None => name.to_owned(),
-    };
-    let has = |name: &str| folder.contains(&inside(name));
-    let of_all = |all: Result<Vec<CapturedCamera>, Invalid>| {
-        all.map(|all| Cameras { all, is_transformed: false }).map_err(|fault| fault.about(path))
-    };
-    if folder.root().join(path).is_dir() {
-        if has("cameras.bin") || has("images.bin") {
-            let (cameras, images) = (bytes(folder, &inside("cameras.bin"))?, bytes(folder, &inside("images.bin"))?);
-            return of_all(colmap::of_binary(&cameras, &images));
-        }
-        if has("cameras.txt") || has("images.txt") {
-            let (cameras, images) = (text(folder, &inside("cameras.txt"))?, text(folder, &inside("images.txt"))?);
-            return of_all(colmap::of_text(&cameras, &images));
-        }
-        if has("cam.txt") {
-            let (poses, matrices) = (text(folder, &inside("cam.txt"))?, text(folder, &inside("K_list.txt"))?);
-            return of_all(matrices::of_fipt(&poses, &matrices));
-        }
-        let files = matrices::camera_files(&folder.root().join(path));
-        if !files.is_empty() {
-            let read = |name: &String| matrices::of_lighting(name, &text(folder, &inside(name))?);
-            return of_all(files.iter().map(read).collect());
-        }
-        let expected = "cameras and images (.bin or .txt) of COLMAP, cam.txt with K_list.txt, or camera_*.txt";
-        return Err(Invalid(format!("the folder '{path}' holds no cameras; expected {expected}")));
-    }
-    match path.rsplit('.').next() {
-        Some("json") => of_transforms(&bytes(folder, path)?).map_err(|fault: Invalid| fault.about(path)),
-        Some("npz") => of_all(matrices::of_npz(&bytes(folder, path)?)),
-        Some("txt") if path.ends_with("cam.txt") => {
-            let (poses, matrices) = (text(folder, path)?, text(folder, &beside("K_list.txt"))?);
-            of_all(matrices::of_fipt(&poses, &matrices))
-        }
-        _ => {
-            let expected =
-                "transforms.json, an .npz with world_mat_<n>, cam.txt, or a folder of COLMAP or of camera_*.txt";
-            Err(Invalid(format!("'{path}' is no file of cameras that is read here; expected {expected}")))
-        }
-    }
-}
-
-fn bytes(folder: &mut SourceFolder, path: &str) -> Result<Vec<u8>, Invalid> {
-    folder.read(path).map_err(|fault| Invalid(fault.message))
-}
-
-fn text(folder: &mut SourceFolder, path: &str) -> Result<String, Invalid> {
-    let bytes = bytes(folder, path)?;
-    let hint = hint(&bytes).into_owned();
-    String::from_utf8(bytes).map_err(|_| Invalid(format!("'{path}' is no text{hint}")))
-}
-
-impl Invalid {
-    fn about(self, path: &str) -> Self {
-        Self(format!("'{path}': {}", self.0))
-    }
 }
 
 /// The camera with the rotation and translation that take the world to OpenCV's axes (+X right, +Y down, +Z ahead).
@@ -242,7 +176,7 @@ impl FrameLens {
 }
 
 /// The cameras of nerfstudio's `transforms.json`.
-fn of_transforms(bytes: &[u8]) -> Result<Cameras, Invalid> {
+pub(super) fn of_transforms(bytes: &[u8]) -> Result<Cameras, Invalid> {
     check_json(bytes, JSON_LIMITS.0, JSON_LIMITS.1)?;
     let file: Transforms =
         serde_json::from_slice(bytes).map_err(|error| Invalid(format!("not nerfstudio's transforms.json: {error}")))?;

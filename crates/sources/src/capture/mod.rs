@@ -23,6 +23,7 @@ use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceS
 use mateval_dataset::{Role, SceneLights, TriangleMesh};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
+use mateval_files::untrusted::hint;
 use mateval_image::npy_io;
 
 use crate::gltf;
@@ -30,7 +31,7 @@ use crate::log::Log;
 use crate::open::{Invalid, SourceError};
 use crate::source_scene::{FileScene, InstanceOrigin, Missing, read_licence, report_shift, shift_of};
 use crate::surface_mesh::{connected_parts, to_world};
-use cameras::{CapturedCamera, PhotoName};
+use cameras::{Cameras, CapturedCamera, PhotoName};
 
 /// The largest file, in bytes.
 const FILE_BYTES: u64 = 1 << 31;
@@ -105,7 +106,7 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
 
     // The cameras, and of them that of the input photo.
     let in_cameras = |fault: Invalid| fault.in_file(&root.join(&camera_path));
-    let cameras = cameras::read(&mut folder, &camera_path).map_err(in_cameras)?;
+    let cameras = read_cameras(&mut folder, &camera_path).map_err(in_cameras)?;
     if cameras.is_transformed {
         let message =
             "states an `applied_transform`: its poses are in another world than the model that they came from";
@@ -341,6 +342,69 @@ fn origins_of(scan: &Scan, scene: &ReferenceScene, files: &CaptureFiles) -> Resu
     let of =
         |surface: &Surface| InstanceOrigin { role: role(&surface.name), stated: unstated, ..InstanceOrigin::default() };
     Ok(scene.surfaces.iter().map(of).collect())
+}
+
+/// Reads the cameras at `path` in the folder: a file, or a folder of several.
+fn read_cameras(folder: &mut SourceFolder, path: &str) -> Result<Cameras, Invalid> {
+    let inside = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") };
+    let beside = |name: &str| match path.rsplit_once('/') {
+        Some((parent, _)) => format!("{parent}/{name}"),
+        None => name.to_owned(),
+    };
+    let has = |name: &str| folder.contains(&inside(name));
+    let of_all = |all: Result<Vec<CapturedCamera>, Invalid>| {
+        all.map(|all| Cameras { all, is_transformed: false }).map_err(|fault| fault.about(path))
+    };
+    if folder.root().join(path).is_dir() {
+        if has("cameras.bin") || has("images.bin") {
+            let (cameras, images) = (bytes(folder, &inside("cameras.bin"))?, bytes(folder, &inside("images.bin"))?);
+            return of_all(colmap::of_binary(&cameras, &images));
+        }
+        if has("cameras.txt") || has("images.txt") {
+            let (cameras, images) = (text(folder, &inside("cameras.txt"))?, text(folder, &inside("images.txt"))?);
+            return of_all(colmap::of_text(&cameras, &images));
+        }
+        if has("cam.txt") {
+            let (poses, matrices) = (text(folder, &inside("cam.txt"))?, text(folder, &inside("K_list.txt"))?);
+            return of_all(matrices::of_fipt(&poses, &matrices));
+        }
+        let files = matrices::camera_files(&folder.root().join(path));
+        if !files.is_empty() {
+            let read = |name: &String| matrices::of_lighting(name, &text(folder, &inside(name))?);
+            return of_all(files.iter().map(read).collect());
+        }
+        let expected = "cameras and images (.bin or .txt) of COLMAP, cam.txt with K_list.txt, or camera_*.txt";
+        return Err(Invalid(format!("the folder '{path}' holds no cameras; expected {expected}")));
+    }
+    match path.rsplit('.').next() {
+        Some("json") => cameras::of_transforms(&bytes(folder, path)?).map_err(|fault: Invalid| fault.about(path)),
+        Some("npz") => of_all(matrices::of_npz(&bytes(folder, path)?)),
+        Some("txt") if path.ends_with("cam.txt") => {
+            let (poses, matrices) = (text(folder, path)?, text(folder, &beside("K_list.txt"))?);
+            of_all(matrices::of_fipt(&poses, &matrices))
+        }
+        _ => {
+            let expected =
+                "transforms.json, an .npz with world_mat_<n>, cam.txt, or a folder of COLMAP or of camera_*.txt";
+            Err(Invalid(format!("'{path}' is no file of cameras that is read here; expected {expected}")))
+        }
+    }
+}
+
+fn bytes(folder: &mut SourceFolder, path: &str) -> Result<Vec<u8>, Invalid> {
+    folder.read(path).map_err(|fault| Invalid(fault.message))
+}
+
+fn text(folder: &mut SourceFolder, path: &str) -> Result<String, Invalid> {
+    let bytes = bytes(folder, path)?;
+    let hint = hint(&bytes).into_owned();
+    String::from_utf8(bytes).map_err(|_| Invalid(format!("'{path}' is no text{hint}")))
+}
+
+impl Invalid {
+    fn about(self, path: &str) -> Self {
+        Self(format!("'{path}': {}", self.0))
+    }
 }
 
 #[cfg(test)]
