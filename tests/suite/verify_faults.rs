@@ -143,7 +143,7 @@ fn json_files() {
             },
         },
     ];
-    check_all(&faults, true, 7);
+    check_all(&faults, true, 6);
 }
 
 #[test]

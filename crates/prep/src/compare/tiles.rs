@@ -165,7 +165,7 @@ impl Difference {
     /// bound, or no fault can hide. `samples` are ours and theirs. Absent where no number would, in a channel that is
     /// black in our picture.
     pub(super) fn to_decide(
-        &self,
+        self,
         allowed: Tolerance,
         scale: [f64; 3],
         samples: SamplesToDecide,

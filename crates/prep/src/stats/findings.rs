@@ -159,7 +159,7 @@ mod tests {
                 let mut found: Vec<Finding> = (0..20).map(|k| finding(Severity::Note, "mirrored_piece", k)).collect();
                 found.extend((0..at % 4).map(|k| finding(Severity::Warning, "missing_model", k)));
                 found.extend((at == 100).then(|| finding(Severity::Warning, "bad_jid", 7)));
-                (SceneId::new(&format!("room-{at}")).unwrap(), found)
+                (SceneId::new(format!("room-{at}")).unwrap(), found)
             })
             .collect();
         let found = by_code(scenes.iter().map(|(id, found)| (id, found.as_slice())));

@@ -54,7 +54,7 @@ pub(super) fn check(root: &Path, id: &SceneId, twin: &Twin, dataset: &DatasetFil
     for file in found.keys().chain(expected.keys().filter(|file| !found.contains_key(*file))) {
         if found.get(file) != expected.get(file) {
             let message = format!("is not that of scene '{}', with which the twin shares it", twin.of);
-            faults.add("other_twin", *file, "", message);
+            faults.add("other_twin", file, "", message);
         }
     }
     // Without renders, such as in the public part of a hidden split, there is nothing to compare the photo with.

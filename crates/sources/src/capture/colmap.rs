@@ -189,7 +189,8 @@ fn camera_of(
 ) -> Result<CapturedCamera, Invalid> {
     let lens = lenses.get(&camera).ok_or_else(|| Invalid(format!("{what}: there is no camera {camera}")))?;
     let quaternion = DQuat::from_xyzw(qx, qy, qz, qw);
-    if !((quaternion.length() - 1.0).abs() < 1e-3) {
+    let off = (quaternion.length() - 1.0).abs();
+    if off.is_nan() || off > 1e-3 {
         return Err(Invalid(format!("{what}: expected a quaternion of length 1, found {}", quaternion.length())));
     }
     let rotation = DMat3::from_quat(quaternion.normalize());
