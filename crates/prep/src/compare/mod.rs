@@ -49,7 +49,7 @@ use crate::error::PrepError;
 /// Samples per pixel of each half that the built-in tracer renders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampling {
-    /// Until every check that they can decide is decided, and at most [`BUDGET_OVER_THEIRS`] times as many as Blender's:
+    /// Until every check that they can decide is decided, and at most `BUDGET_OVER_THEIRS` times as many as Blender's:
     /// at that number an eighth of the noise is ours.
     #[default]
     UntilDecided,
