@@ -15,7 +15,7 @@ SCHEMAS = Path("dataset_spec/schema")
 #: The pages, by group, in the order of the menu.
 GROUPS = {
     "Dataset": ["dataset", "targets", "scene", "compare_verdict"],
-    "Ground truth": ["reference", "source_materials", "lights", "material_classes", "render", "scorer"],
+    "Ground truth": ["reference", "source_materials", "lights", "material_classes", "render", "scorer", "measured", "measurements"],
     "Submissions and results": ["submission", "lint", "result", "rounded", "verification", "explain", "leaderboard", "errata", "votes",
                                 "preferences"],
     "Reports of a dataset": ["survey", "stats", "findings", "compare", "release"],

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::materials::texels::{checked_size, value};
 use crate::open_scene::OpenScene;
-use crate::result::constancy::{Constancy, Deviation, Spread};
+use crate::result::constancy::{Constancy, Deviation, PartSpread};
 use crate::truth::true_material;
 
 /// The answers to a family: those to the scene first, then those to its twins.
@@ -163,7 +163,7 @@ struct PassSums {
 impl PassSums {
     fn deviation(&self, area_m2: f64, members: f64) -> Deviation {
         let root = |sum: f64, count: f64| (sum / (area_m2 * count)).sqrt();
-        let spread = |[deviation, contrast]: [f64; 2], channels: f64| Spread {
+        let spread = |[deviation, contrast]: [f64; 2], channels: f64| PartSpread {
             deviation: root(deviation, members * channels),
             contrast: root(contrast, channels),
         };
@@ -246,8 +246,8 @@ fn shown(color: [f64; 3]) -> LinearRgb {
 mod tests {
     use super::*;
 
-    fn spread(deviation: f64, contrast: f64) -> Spread {
-        Spread { deviation, contrast }
+    fn spread(deviation: f64, contrast: f64) -> PartSpread {
+        PartSpread { deviation, contrast }
     }
 
     /// Half the luminance's contrast and a tenth of the chroma's, by hand; without one of both contrasts no value.

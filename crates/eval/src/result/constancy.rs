@@ -38,9 +38,9 @@ pub struct Deviation {
     /// In CIEDE2000, of colours clipped to 0..1.
     pub delta_e: f64,
     /// Of the luminance.
-    pub luminance: Spread,
+    pub luminance: PartSpread,
     /// Of what remains of a colour without its luminance, also over channels.
-    pub chroma: Spread,
+    pub chroma: PartSpread,
     /// The deviations of luminance and of chroma, each divided by its contrast: their root mean square. Null where one
     /// of both contrasts is at most 0.505/255, which counts as none.
     pub relative: Option<f64>,
@@ -49,7 +49,7 @@ pub struct Deviation {
 /// Of one part of the colours, linear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Spread {
+pub struct PartSpread {
     /// How far the answers to a family lie from their mean.
     pub deviation: f64,
     /// How far the texels of the family's mean lie from the mean of all its texels.
@@ -60,7 +60,7 @@ impl Deviation {
     /// The value of [`Self::relative`].
     pub(crate) fn guarded(&self) -> Option<f64> {
         let has_contrast = [self.luminance, self.chroma].iter().all(|part| part.contrast > f64::from(HALF_A_BYTE));
-        let square = |part: Spread| (part.deviation / part.contrast).powi(2);
+        let square = |part: PartSpread| (part.deviation / part.contrast).powi(2);
         has_contrast.then(|| ((square(self.luminance) + square(self.chroma)) / 2.0).sqrt())
     }
 }
