@@ -15,7 +15,7 @@ KINDS = ("OPTIX", "CUDA", "HIP", "ONEAPI", "METAL")
 """Kinds of devices in the order in which `auto` takes them: ray-tracing cores first."""
 
 DRIVER_FILE = Path("/proc/driver/nvidia/version")
-"""Where Linux's driver of NVIDIA's cards states its version. Blender tells none."""
+"""Where Linux's driver of NVIDIA's cards states its version. Blender states none."""
 
 
 def found(*, preferences: Any) -> dict[str, list]:
@@ -67,7 +67,7 @@ def choose(*, preferences: Any, wanted: str, required: str | None, turn: int) ->
 
 
 def driver(*, kind: str, file: Path = DRIVER_FILE) -> str | None:
-    """Returns the version of the card's driver, or None where the system does not state it."""
+    """Returns the version of the card's driver, or None if the system does not state it."""
     if kind == "METAL":
         return f"macOS {platform.mac_ver()[0]}"
     if kind not in ("OPTIX", "CUDA"):

@@ -62,7 +62,7 @@ pub fn lift(
         projection: seen.camera.projection(),
         focal: seen.camera.intrinsics.fx.max(seen.camera.intrinsics.fy),
     };
-    // An atlas has up to 16 million texels, of which there must be one copy.
+    // An atlas has up to 16 million texels, so it is filled in place.
     let mut texels = Picture::filled(size, size, Texel::Unused);
     texels.pixels_mut().par_chunks_mut(size).enumerate().for_each(|(y, row)| {
         row.iter_mut().enumerate().for_each(|(x, texel)| *texel = lifter.texel(x, y));

@@ -149,7 +149,7 @@ struct Sums {
     delta_e: f64,
 }
 
-/// Squares.
+/// Sums of squares over the texels, weighted by area.
 #[derive(Clone, Copy, Debug, Default)]
 struct PassSums {
     /// Over the family and channels.
@@ -272,7 +272,7 @@ mod tests {
         assert!(parts([0.3; 3])[1] < 1e-30);
     }
 
-    /// Two answers of which one is twice the other: aligned, both are their mean.
+    /// One answer is twice the other: aligned, both are their mean.
     #[test]
     fn scales_bring_answers_to_the_mean_of_the_family() {
         let means = Means { area_m2: 2.0, colors: vec![[0.4, 0.2, 0.0], [0.8, 0.4, 0.0]] };

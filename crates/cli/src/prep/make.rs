@@ -231,7 +231,7 @@ impl BuildArgs {
     }
 }
 
-/// Up to so many lines of one kind are printed; more are counted.
+/// The most lines of one kind that are printed; further ones are counted.
 const MOST_LINES: usize = 12;
 
 /// Names the scenes that an earlier run has made, or counts them.

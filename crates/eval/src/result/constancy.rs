@@ -71,9 +71,9 @@ pub struct ConstancyMeans {
     pub families: usize,
     /// The number of families in which [`Self::relative`] has a value.
     pub with_contrast: usize,
-    /// Raw, then aligned.
+    /// Root mean square of linear deviations: raw, then aligned.
     pub linear: [f64; 2],
-    /// Raw, then aligned.
+    /// Root mean square in CIEDE2000: raw, then aligned.
     pub delta_e: [f64; 2],
     /// Raw, then aligned; the mean over the families that have a value.
     pub relative: [Option<f64>; 2],

@@ -47,7 +47,7 @@ impl DeviceChoice {
     pub fn summary(self) -> &'static str {
         match self {
             Self::Cpu => "The processor",
-            Self::Auto => "The first of those below of which there is one, else the processor, with a message",
+            Self::Auto => "The first kind below that Cycles finds, else the processor, with a message",
             Self::Optix => "An NVIDIA card with its ray-tracing cores",
             Self::Cuda => "An NVIDIA card",
             Self::Hip => "An AMD card",

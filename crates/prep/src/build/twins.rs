@@ -89,7 +89,7 @@ fn make_one(
     for file in own {
         expected.insert(format!("scenes/{id}/{file}"), sha256_of_file(&work.path().join(file))?);
     }
-    // What it shares.
+    // Files that it shares with the scene, as hard links.
     let prefix = format!("scenes/{}/", scene.id);
     let shared: Vec<(&str, &str)> = list
         .entries()

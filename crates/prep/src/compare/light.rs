@@ -147,7 +147,7 @@ fn most_open(tiles: usize) -> usize {
     (BOUNDS.tile_share_open * tiles as f64) as usize
 }
 
-/// The samples with which so many tiles would be decided that the check is. The tiles that need the least are first.
+/// The samples with which enough tiles would be decided to decide the check. The tiles that need the least are first.
 fn tiles_to_decide(
     off: &[Difference],
     allowed: Tolerance,

@@ -7,10 +7,10 @@ use super::file::{
     Check, CompareFile, LightComparison, Quantity, SamplesToDecide, SceneComparison, State, ViewComparison,
 };
 
-/// Up to so many scenes every view and picture has a row of its own.
+/// The most scenes for which every view and picture has a row of its own.
 const SCENES_IN_FULL: usize = 3;
 
-/// Up to so many checks that do not agree are printed; the page of a scene lists them all.
+/// The most checks that are printed where they do not agree; the page of a scene lists them all.
 const MOST_FAULTS: usize = 40;
 
 /// The tables, then the checks that do not agree, then the verdict, for a terminal of `columns`; of any width if absent.

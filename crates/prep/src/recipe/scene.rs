@@ -38,7 +38,7 @@ pub struct RecipeScene {
     /// Whether others have the files of the source.
     #[serde(default, rename = "source")]
     pub availability: Availability,
-    /// Lightings in which the scene is shown again, as scenes of which constancy is scored.
+    /// Lightings in which the scene is shown again, as further scenes. Their constancy is scored.
     #[serde(default)]
     pub twins: Vec<LightingName>,
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.

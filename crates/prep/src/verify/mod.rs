@@ -131,7 +131,7 @@ fn check_targets(root: &Path, dataset: &DatasetFile, absent: &[SceneId], faults:
                 "twin_target",
                 TARGETS,
                 &place,
-                format!("'{}' is a twin, of which no view is scored", target.scene),
+                format!("'{}' is a twin, and no view of a twin is scored", target.scene),
             );
         }
         let view_exists =

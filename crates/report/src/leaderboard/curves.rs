@@ -272,7 +272,7 @@ type Point<'a> = (&'a str, f64, Option<f64>);
 type Values<'a> = (&'a str, BTreeMap<u32, f64>);
 
 impl Chart {
-    /// None where there are fewer than two classes, which make no line. The axis shows at least a part of `least_span`,
+    /// Absent if there are fewer than two classes, which make no line. The axis shows at least a part of `least_span`,
     /// with the values in its middle.
     fn new(
         title: String,
