@@ -7,7 +7,7 @@ use std::time::Duration;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, SceneId, ViewId};
 use mateval_image::{LinearRgb, Picture};
-use mateval_prep::blender::{BlenderEvent, BlenderLimits, BlenderProgram, JobFolder, JobPlan, JobView, tail};
+use mateval_prep::blender::{BlenderEvent, BlenderLimits, BlenderProgram, DeviceChoice, JobFolder, JobPlan, JobView, tail};
 
 use super::tiles::Tiles;
 
@@ -51,6 +51,9 @@ fn pictures(shot: &Shot) -> Vec<Picture<LinearRgb>> {
         samples_each_half: shot.samples,
         max_bounces: BOUNCES,
         threads: 0,
+        device: DeviceChoice::Cpu,
+        required_device: None,
+        turn: 0,
     };
     let job = JobFolder::prepare(folder.path(), &plan).unwrap();
     let hour = Duration::from_secs(3600);
