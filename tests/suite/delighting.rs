@@ -14,10 +14,10 @@ use super::command::{Run, baseline, build, render, run};
 use super::lifting::base_colors;
 use super::sample::{files_below, json, write_source};
 
-/// The sample's room, rendered by the built-in tracer.
+/// The photo of the sample's room, rendered by the built-in tracer.
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("delighting");
-    let recipe = write_source(&folder.join("source"), "resolution = [96, 72]\natlas_size = 64", &["room"]);
+    let recipe = write_source(&folder.join("source"), "resolution = [96, 72]\natlas_size = 64\nviews = []", &["room"]);
     run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
     run(&mut render(&folder.join("dataset"), 64)).ends_with(0);
     folder.join("dataset")

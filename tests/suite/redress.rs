@@ -7,15 +7,15 @@ use std::sync::LazyLock;
 use mateval_image::{Picture, png_io};
 use serde_json::Value;
 
-use super::command::{build, mateval, render, run, run_words, stats, verify};
-use super::sample::{files_below, json, manifest};
+use super::command::{build, mateval, render, run, stats, verify};
+use super::sample::{copy_source, files_below, json, manifest};
 use mateval_testkit::kept_folder;
 
 /// A folder with the sample in `source`, a `key`, a folder of `materials`, and these datasets: the `original` with
 /// classes of material, two of the same key (`first`, `again`), and one of an `other` key.
 static BUILT: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("redress");
-    run_words([Path::new("sample"), &folder.join("source")]).ends_with(0);
+    copy_source(&folder.join("source"));
     write_materials(&folder.join("materials"));
     made(&folder, "original", "");
     std::fs::write(folder.join("key"), [7; 32]).unwrap();
@@ -181,7 +181,7 @@ fn materials_come_from_the_folder_and_are_not_named() {
 #[test]
 fn keys_that_are_no_secret_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    run_words([Path::new("sample"), &folder.path().join("source")]).ends_with(0);
+    copy_source(&folder.path().join("source"));
     let refused = |redress: &str, text: &str| {
         let recipe = recipe(folder.path(), redress);
         run(&mut build(&recipe, &folder.path().join("dataset"))).ends_with(2).says(text);

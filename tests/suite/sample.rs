@@ -23,6 +23,13 @@ static OWN_MATERIALS: LazyLock<PathBuf> = LazyLock::new(|| {
     dataset
 });
 
+/// What `mateval sample` writes.
+static SOURCE: LazyLock<PathBuf> = LazyLock::new(|| {
+    let source = kept_folder("source").join("source");
+    run_words([Path::new("sample"), &source]).ends_with(0);
+    source
+});
+
 fn built(name: &str, head: &str) -> PathBuf {
     let folder = kept_folder(name);
     let recipe = write_source(&folder.join("source"), head, &["room"]);
@@ -56,10 +63,15 @@ pub fn copied_dataset() -> tempfile::TempDir {
 /// Writes the sample's source with a recipe that has these lines in its head and the room once for each id. Returns the
 /// recipe's path.
 pub fn write_source(source: &Path, head: &str, ids: &[&str]) -> PathBuf {
-    run_words([Path::new("sample"), source]).ends_with(0);
+    copy_source(source);
     let recipe = source.join("recipe.toml");
     std::fs::write(&recipe, recipe_text(head, ids)).unwrap();
     recipe
+}
+
+/// Writes the sample's source with its own recipe: a copy, since packing its textures takes a second.
+pub fn copy_source(source: &Path) {
+    copy_folder(&SOURCE, source);
 }
 
 /// A recipe of the sample's room.

@@ -7,15 +7,15 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::command::{baseline, build, render_for_scores, run, run_words, score, verify};
-use super::sample::json;
+use super::command::{baseline, build, render_for_scores, run, score, verify};
+use super::sample::{copy_source, json};
 use mateval_testkit::{copy_folder, kept_folder};
 
 /// The source, and the dataset of its living room with stated materials, rendered.
 static STATED: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
     let folder = kept_folder("stated");
     let (source, dataset) = (folder.join("source"), folder.join("dataset"));
-    run_words([Path::new("sample"), &source]).ends_with(0);
+    copy_source(&source);
     // The tables are of metal.
     let info = source.join("house/3D-FUTURE-model/model_info.json");
     let text = std::fs::read_to_string(&info).unwrap();
