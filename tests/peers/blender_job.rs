@@ -7,7 +7,9 @@ use std::time::Duration;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, SceneId, ViewId};
 use mateval_image::{LinearRgb, Picture};
-use mateval_prep::blender::{BlenderEvent, BlenderLimits, BlenderProgram, DeviceChoice, JobFolder, JobPlan, JobView, tail};
+use mateval_prep::blender::{
+    BlenderEvent, BlenderLimits, BlenderProgram, DeviceChoice, JobFolder, JobPlan, JobView, tail,
+};
 
 use super::tiles::Tiles;
 
