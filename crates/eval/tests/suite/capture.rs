@@ -645,16 +645,12 @@ fn poses_of_another_convention_are_named() {
 fn regions_outside_of_the_picture_are_left_out() {
     let transforms = std::fs::read_to_string(SOURCE.join("distorted.json")).unwrap();
     std::fs::write(SOURCE.join("pincushion.json"), transforms.replace("\"k1\":-0.2", "\"k1\":2.0")).unwrap();
-    let corner = |x: usize, y: usize| {
-        if x < 2 && y < 2 {
-            20
-        } else if (20..30).contains(&x) {
-            10
-        } else {
-            0
-        }
+    let values = |x: usize, y: usize| match x {
+        0 if (20..28).contains(&y) => 20,
+        20..30 => 10,
+        _ => 0,
     };
-    png_io::write_grey_bytes(&SOURCE.join("edge.png"), &Picture::from_fn(64, 48, corner)).unwrap();
+    png_io::write_grey_bytes(&SOURCE.join("edge.png"), &Picture::from_fn(64, 48, values)).unwrap();
     let area = |name: &str, value: u16| MeasuredArea {
         name: name.to_owned(),
         photo: "image_0001".to_owned(),

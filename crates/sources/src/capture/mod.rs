@@ -123,9 +123,7 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
     for name in std::iter::once(&files.input).chain(&files.novel) {
         let at = cameras::find(&cameras.all, &photos, name).map_err(in_cameras)?;
         if named.contains(&at) {
-            return Err(
-                in_cameras(Invalid(format!("the photo {} is named twice; name each once", quoted(name)))).into()
-            );
+            return Err(in_cameras(Invalid(format!("the photo {} is named twice; name each once", quoted(name)))));
         }
         named.push(at);
         let camera = cameras.all[at].clone();
