@@ -19,7 +19,8 @@
 //!
 //! Of a scene with twins, [`constancy`] then compares the maps of scene and twins with each other.
 //!
-//! A captured scene has no true maps: [`materials::measured`] compares means over regions with measured colours.
+//! A captured scene has no true maps: [`materials::measured`] compares means over regions with measured colours, and
+//! renders under fitted lights are compared with its photos.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
 //! ([`result::means`]): pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.

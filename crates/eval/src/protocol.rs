@@ -8,6 +8,7 @@ use mateval_dataset::lighting::RelitRules;
 use mateval_dataset::material::PrincipledFlavour;
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_stage::StageRules;
+use mateval_light::photo_pixels::PhotoRules;
 use mateval_metrics::mask_rule::MaskRule;
 use mateval_metrics::measured::{MAW_LEAST, MAW_SIZE};
 use schemars::JsonSchema;
@@ -50,6 +51,9 @@ pub struct Protocol {
     /// captured scenes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured: Option<MeasuredRules>,
+    /// The pixels of a captured scene's photos that do not count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photos: Option<PhotoRules>,
     /// Constants that all protocols share because the code holds them.
     pub fixed: FixedRules,
     /// The version of the scorer; `CHANGELOG.md` lists what each changed.
@@ -82,22 +86,20 @@ impl Protocol {
     pub const NAMES: [&str; 3] = ["mateval-3", "paper", CAPTURE];
 
     pub fn named(name: &str) -> Result<Self, EvalError> {
+        // Fitted light is near 22 dB: a few plain samples are enough.
+        let fitted = || {
+            let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
+            light.samples.fix(16);
+            light
+        };
         let (mask_rule, albedo_space, light) = match name {
             "mateval-3" => {
                 let tracks = vec![Track::True, Track::Relit];
                 (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
             }
-            "paper" => {
-                let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
-                // Its numbers lie near 22 dB: a few plain samples are enough.
-                light.samples.fix(16);
-                (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
-            }
-            // Nothing of a captured room is known but measured colours.
-            CAPTURE => {
-                let light = LightRules::new(Vec::new(), PrincipledFlavour::Blender);
-                (MaskRule::Inside, AlbedoSpace::Linear, light)
-            }
+            "paper" => (MaskRule::BlackFill, AlbedoSpace::Srgb, fitted()),
+            // Nothing of a captured room is known but measured colours and photos.
+            CAPTURE => (MaskRule::Inside, AlbedoSpace::Linear, fitted()),
             _ => return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES }),
         };
         Ok(Self {
@@ -114,6 +116,7 @@ impl Protocol {
             },
             light,
             measured: (name == CAPTURE).then_some(MeasuredRules::OF_THIS_SCORER),
+            photos: (name == CAPTURE).then(PhotoRules::default),
             fixed: FixedRules::of_this_scorer(),
             scorer_version: SCORER_VERSION,
         })
@@ -163,8 +166,8 @@ impl Protocol {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Track {
-    /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT) or the scene's own emitters
-    /// (Bitterli).
+    /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT, captures) or the scene's own
+    /// emitters (Bitterli).
     Fitted,
     /// The scene's own emitters.
     True,

@@ -100,7 +100,7 @@ pub struct ProtocolResult {
     /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where
     /// the error of a picture may be noise alone.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
-    /// By scene, the radiances that were fitted; only under `paper`.
+    /// By scene, the radiances that were fitted; only under `paper` and `capture-1`.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// The values of every picture over every region.
     pub pictures: Vec<PictureValues>,
@@ -210,6 +210,10 @@ pub struct PictureValues {
     pub region: Region,
     /// Their number. SSIM of a mask is a mean over the windows that lie wholly inside.
     pub pixels: usize,
+    /// Of photos of a captured room: the share of the region's pixels that do not count, 0 to 1, because they are clipped
+    /// or the depth jumps beside them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<f64>,
     /// The value of each metric; those are left out for which no pixel or window counts.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub values: BTreeMap<Metric, f64>,
@@ -273,6 +277,7 @@ impl PictureValues {
             lighting: None,
             region,
             pixels,
+            left_out: None,
             values: BTreeMap::new(),
             mse_error: None,
             exact: false,

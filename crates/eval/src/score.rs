@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_dataset::changes;
 use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
@@ -21,7 +22,7 @@ use mateval_submission::prediction::{PredictedScene, read_scene};
 use crate::constancy::Family;
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
-use crate::light::score::score_light;
+use crate::light::score::{score_light, score_photos};
 use crate::metric::{LPIPS_NET, Metric, PictureKind};
 use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::pictures_dir::PicturesDir;
@@ -351,6 +352,9 @@ impl<'a> ScorePlan<'a> {
             let folder = format!("ground_truth/renders/{renderer}/");
             self.dataset.check_files(&scene.id, |file| file.starts_with(&folder) && file.ends_with("/rgb.exr"))?;
         }
+        if !scene.source.kind.states_materials() {
+            self.dataset.check_files(&scene.id, |file| file == format!("views/{INPUT}/rgb.exr"))?;
+        }
         let open = OpenScene::read(self.dataset, scene)?;
         let folder_of = |root: &Path, at: usize| match self.submissions.len() {
             1 => root.to_owned(),
@@ -611,28 +615,26 @@ fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> 
     let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
     let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
     let scores = |at: usize| task.protocols[at].scores(task.scene);
-    if !task.scene.source.kind.states_materials() {
-        if (0..task.protocols.len()).any(scores) {
-            task.score_measured(&scores, &mut sheets)?;
+    let scoring: Vec<usize> = (0..task.protocols.len()).filter(|at| scores(*at)).collect();
+    if !scoring.is_empty() && !task.scene.source.kind.states_materials() {
+        task.score_measured(&scores, &mut sheets)?;
+        for &at in &scoring {
+            task.protocols[at].photos.as_ref().map_or(Ok(()), |rules| score_photos(task, rules, at, &mut sheets))?;
         }
-        let finish = |sheets: Vec<ScoreSheet>| sheets.into_iter().map(|sheet| sheet.score).collect();
-        return Ok(sheets.into_iter().map(finish).collect());
-    }
-    if !(0..task.protocols.len()).any(scores) {
-        return Ok(sheets.into_iter().map(|sheets| sheets.into_iter().map(|sheet| sheet.score).collect()).collect());
-    }
-    for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {
-        let wanted = |at: usize| scores(at) && (task.set == ViewSet::Turned || task.protocols[at].wide_views);
-        if !(0..task.protocols.len()).any(wanted) {
-            continue;
+    } else if !scoring.is_empty() {
+        for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {
+            let wanted = |at: usize| scores(at) && (task.set == ViewSet::Turned || task.protocols[at].wide_views);
+            if !(0..task.protocols.len()).any(wanted) {
+                continue;
+            }
+            let truths = task.truths()?;
+            let base_colors = task.score_materials(&truths, &wanted, &mut sheets)?;
+            for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
+                score_light(&task, &truths, &base_colors, at, &mut sheets)?;
+            }
         }
-        let truths = task.truths()?;
-        let base_colors = task.score_materials(&truths, &wanted, &mut sheets)?;
-        for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
-            score_light(&task, &truths, &base_colors, at, &mut sheets)?;
-        }
+        task.score_texels(&mut sheets)?;
     }
-    task.score_texels(&mut sheets)?;
     let finish = |mut sheet: ScoreSheet| {
         sheet.state_noise();
         SceneScore { instances: sheet.errors.finish(task.scene), ..sheet.score }

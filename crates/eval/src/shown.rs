@@ -37,7 +37,8 @@ pub fn scene_albedo(
     let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
     let predictions = predictions_of(submissions, scene, &atlases)?;
     let view = |view: &View| {
-        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions.iter().collect::<Vec<_>>());
+        let predictions: Vec<_> = predictions.iter().collect();
+        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions, false);
         let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
         Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
     };

@@ -13,6 +13,7 @@ use mateval_submission::prediction::{PredictedMaterial, PredictedScene, one_texe
 use crate::error::EvalError;
 
 /// A view's true maps and its masks.
+#[derive(Clone)]
 pub struct ViewTruth {
     pub albedo: Picture<LinearRgb>,
     /// Perceptual, 0 to 1.

@@ -14,6 +14,7 @@ use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::{FewerBits, is_turned};
 use mateval_image::{ImageError, Texels, Texture};
 
+use crate::capture::cameras::CapturedCamera;
 use crate::log::Log;
 
 /// A licence that must be passed on with the scene.
@@ -115,8 +116,13 @@ pub struct SourceScene {
     /// What was read. Each surface becomes an instance.
     pub read: FileScene,
     pub camera: Camera,
-    /// The photo of a captured room.
+    /// The input photo of a captured room.
     pub captured: Option<CapturedPhoto>,
+    /// The photos of other views of a captured room, relative to the source's folder, and their cameras.
+    pub novel: Vec<(String, CapturedCamera)>,
+    /// The poses that the input camera of a captured room has by other conventions, each with what is done to the stated
+    /// pose.
+    pub other_poses: Vec<(&'static str, CapturedCamera)>,
 }
 
 /// The photo that the camera of a captured room took.

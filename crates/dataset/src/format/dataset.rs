@@ -204,6 +204,10 @@ pub struct SceneFile {
     /// picture is not known, so the scene has no renders and its light is not scored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo: Option<Photo>,
+    /// By view, the other photos of a captured room, with which renders are compared:
+    /// `ground_truth/views/<view>/photo.exr`. Their exposure is theirs alone. Absent where there are none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub novel_photos: BTreeMap<ViewId, Photo>,
     /// What is public of the truth, where materials were replaced by others that were drawn with a secret key; absent
     /// where the truth has the source's materials.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -283,7 +287,7 @@ pub enum WeakReason {
     Kept,
 }
 
-/// An input picture that came from elsewhere.
+/// A photo from elsewhere, in the place of a rendered picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Photo {
@@ -333,11 +337,12 @@ pub struct SourceFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct View {
-    /// `input`, or the offset's name; begins with `wide_` for views from another place, and for no others.
+    /// `input`, or the offset's name; begins with `wide_` for views from another place, and for no others; `novel_1` and
+    /// so on for the other photos of a captured room.
     pub id: ViewId,
-    /// Degrees about the input camera's own X axis, up is positive; 0 for wide views.
+    /// Degrees about the input camera's own X axis, up is positive; 0 for wide views and other photos.
     pub x_deg: f64,
-    /// Degrees about the camera's own Y axis, after X; left is positive; 0 for wide views.
+    /// Degrees about the camera's own Y axis, after X; left is positive; 0 for wide views and other photos.
     pub y_deg: f64,
     /// The camera of every picture of the view.
     pub camera: Camera,
@@ -521,7 +526,7 @@ pub enum SourceKind {
 
 impl SourceKind {
     /// Whether the source states what its surfaces are made of. Otherwise the materials of `ground_truth` are
-    /// placeholders: they are no truth, and only measured colours are scored.
+    /// placeholders: they are no truth, and only measured colours and photos are scored.
     pub fn states_materials(self) -> bool {
         self != Self::Capture
     }

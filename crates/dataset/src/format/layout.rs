@@ -124,6 +124,11 @@ impl SceneFolder {
         self.truth().join("measured.json")
     }
 
+    /// `ground_truth/views/<view>/photo.exr`: the photo of another view of a captured scene.
+    pub fn novel_photo(&self, view: &ViewId) -> PathBuf {
+        self.truth_view(view).join("photo.exr")
+    }
+
     /// `ground_truth/views/<view>/measured.png`: the regions whose colour was measured.
     pub fn measured_regions(&self, view: &ViewId) -> PathBuf {
         self.truth_view(view).join("measured.png")

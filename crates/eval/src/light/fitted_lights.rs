@@ -5,11 +5,16 @@
 //! shows the input view under each light alone. Two independent streams of paths give two fits, one for each half of
 //! the render, so that the noise of the fit adds no bias to the squared error; the difference of the errors under
 //! either fit shows its noise. The truth is another renderer's picture, so nothing travels along and nothing is exact.
+//!
+//! Photos of a captured room are compared in the same way. Light is fitted to the input photo alone; every other photo
+//! has an exposure of its own, by which renders are multiplied.
 
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::{Camera, RendererId, SceneLights};
-use mateval_image::{LinearRgb, Picture, SrgbRgb};
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, exr_io};
 use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
 use mateval_light::light_stage;
+use mateval_light::photo_pixels::{PhotoRules, exposure_factor};
 use mateval_tracer::{LightBasis, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
 use rayon::prelude::*;
 
@@ -20,21 +25,57 @@ use crate::light::shared_paths::{SharedPaths, batches, picture_of};
 use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, SceneTask};
-use crate::truth::{ViewTruth, photo_of_renderer};
+use crate::truth::{ViewTruth, photo_of_renderer, sized};
 
-/// Fits every submission's lights, renders it under them and compares it with the photo's renderer.
+/// What renders under fitted lights are compared with, by view.
+pub(crate) struct Photos {
+    /// Linear, before exposure.
+    pictures: Vec<Picture<LinearRgb>>,
+    /// Of a photo whose exposure is free, the pixels by which it is found.
+    free: Vec<Option<Mask>>,
+}
+
+impl Photos {
+    pub(crate) fn of_renderer(task: &SceneTask<'_>, renderer: &RendererId) -> Result<Self, EvalError> {
+        let pictures = task.views.iter().map(|view| photo_of_renderer(task.folder, renderer, view));
+        Ok(Self { pictures: pictures.collect::<Result<_, _>>()?, free: vec![None; task.views.len()] })
+    }
+
+    /// The photos of a captured scene, and the pixels of each that count.
+    pub(crate) fn of_capture(
+        task: &SceneTask<'_>,
+        truths: &[ViewTruth],
+        rules: &PhotoRules,
+    ) -> Result<(Self, Vec<Mask>), EvalError> {
+        let (mut photos, mut all_counted) = (Self { pictures: Vec::new(), free: Vec::new() }, Vec::new());
+        for (view, truth) in task.views.iter().zip(truths) {
+            let shown = task.folder.view(&view.id);
+            let is_input = view.id.as_str() == INPUT;
+            let file = if is_input { shown.join("rgb.exr") } else { task.folder.novel_photo(&view.id) };
+            let photo = sized(view, exr_io::read_linear(&file)?)?;
+            let depth = sized(view, exr_io::read_scalar(&shown.join("depth.exr"))?)?;
+            let counted = rules.counted(&photo, task.scene.exposure, &depth, &truth.valid);
+            photos.pictures.push(photo);
+            photos.free.push((!is_input).then(|| counted.clone()));
+            all_counted.push(counted);
+        }
+        Ok((photos, all_counted))
+    }
+}
+
+/// Fits every submission's lights to the input photo, renders it under them and compares it with the photos.
 pub(crate) fn compare_under_fitted_lights(
     task: &SceneTask<'_>,
-    renderer: &RendererId,
+    photos: &Photos,
     truths: &[ViewTruth],
     base_colors: &BaseColors,
     protocol: &Protocol,
     each: &mut LitSink<'_>,
 ) -> Result<(), EvalError> {
     let lit = FittedLights::new(task, protocol)?;
-    let photos: Vec<Picture<LinearRgb>> =
-        task.views.iter().map(|view| photo_of_renderer(task.folder, renderer, view)).collect::<Result<_, _>>()?;
-    let references: Vec<ColorPicture> = photos.iter().map(|photo| ColorPicture::new(exposed(task, photo))).collect();
+    let exposed = |picture: &Picture<LinearRgb>| times(picture, task.scene.exposure);
+    let Photos { pictures: photos, free } = photos;
+    let references: Vec<ColorPicture> = photos.iter().map(|photo| ColorPicture::new(exposed(photo))).collect();
     let paths = lit.paths(task, protocol);
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
     let pixels = task.pixels().next().unwrap_or(0);
@@ -46,11 +87,10 @@ pub(crate) fn compare_under_fitted_lights(
     for batch in batches(task.predictions, &all, 0, bytes) {
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
         let repaint = paths.repaint(&predictions, None)?;
-        let fits = lit.fit(&paths, &repaint, task, truths, &photos)?;
+        let fits = lit.fit(&paths, &repaint, task, truths, photos)?;
         let mixes: Vec<Vec<LightMix>> = fits.iter().map(|fit| fit.streams.to_vec()).collect();
-        let picture = |renders: &[ViewsRender], at: usize, fit: usize, view: usize| {
-            exposed(task, picture_of(&renders[at], view, fit))
-        };
+        let picture =
+            |renders: &[ViewsRender], at: usize, fit: usize, view: usize| exposed(picture_of(&renders[at], view, fit));
         let (quarters, not_finite) = paths.quarters(&repaint, &mixes, &cameras, batch.len(), samples, picture)?;
         for (at, (&index, fit)) in batch.iter().zip(fits).enumerate() {
             let [first, second] = &quarters[at][..] else { unreachable!("two fits make two pictures") };
@@ -61,23 +101,27 @@ pub(crate) fn compare_under_fitted_lights(
                 first.iter().zip(second).map(|(a, b)| [&a[0], &a[1], &b[2], &b[3]]).collect();
             let under = |quarters: &[Vec<Picture<LinearRgb>>]| {
                 let views: Vec<_> = quarters.iter().map(|view| [0, 1, 2, 3].map(|at| &view[at])).collect();
-                plain_differences(&views, &guides)
+                plain_differences(&views, &guides, free)
             };
             let of_fits = Some([under(first), under(second)]);
             let (track, not_finite, fit) = (Track::Fitted, not_finite[at], Some(fit.radiances));
-            let views = plain_differences(&both, &guides);
+            let views = plain_differences(&both, &guides, free);
             each(index, LitViews { track, lighting: None, references: &references, views, of_fits, fit, not_finite })?;
         }
     }
     Ok(())
 }
 
-fn exposed(task: &SceneTask<'_>, radiance: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    radiance.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * task.scene.exposure) as f32)))
+fn times(picture: &Picture<LinearRgb>, factor: f64) -> Picture<LinearRgb> {
+    picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * factor) as f32)))
 }
 
-/// The encoded difference of each half from the photo, without any correction.
-fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &ViewGuides<'_>) -> Vec<LightDifference> {
+/// The encoded difference of each half from the photo, without any correction but for a `free` exposure.
+fn plain_differences(
+    views: &[[&Picture<LinearRgb>; 4]],
+    guides: &ViewGuides<'_>,
+    free: &[Option<Mask>],
+) -> Vec<LightDifference> {
     let difference = |a: &Picture<LinearRgb>, b: &Picture<LinearRgb>, factor: f64| {
         Picture::from_fn(a.width(), a.height(), |x, y| {
             let [a, b] = [a, b].map(|picture| picture.get(x, y).0.map(|value| encoded(f64::from(value))));
@@ -86,9 +130,15 @@ fn plain_differences(views: &[[&Picture<LinearRgb>; 4]], guides: &ViewGuides<'_>
     };
     let views = views.par_iter().enumerate();
     views
-        .map(|(view, [a1, a2, b1, b2])| {
+        .map(|(view, quarters)| {
             let guide = guides.of(view);
-            let means = [mean_of(a1, a2), mean_of(b1, b2)];
+            let halves = |[a1, a2, b1, b2]: [&Picture<LinearRgb>; 4]| [mean_of(a1, a2), mean_of(b1, b2)];
+            let multiplied = free[view].as_ref().map(|counted| {
+                let factor = exposure_factor(halves(*quarters).each_ref(), guide.reference, counted);
+                quarters.map(|quarter| times(quarter, factor))
+            });
+            let quarters = multiplied.as_ref().map_or(*quarters, |multiplied| multiplied.each_ref());
+            let ([a1, a2, b1, b2], means) = (quarters, halves(quarters));
             let halves = means.each_ref().map(|mean| difference(mean, guide.reference, 1.0));
             let noise = [difference(a1, a2, 0.5), difference(b1, b2, 0.5)];
             LightDifference { halves, noise, shown: guided_mean(means.each_ref(), &guide).to_srgb() }

@@ -1,14 +1,18 @@
 //! The metrics of predictions under light: of each region of every view, and of each instance.
 
+use mateval_dataset::dataset::View;
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::{Camera, SceneId};
-use mateval_image::Picture;
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_light::photo_pixels::PhotoRules;
+use mateval_metrics::pixel::pixel_count;
 use mateval_metrics::{MetricError, Psnr};
 use mateval_tracer::shared_centre::noise_blocks;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::LightDifference;
-use crate::light::fitted_lights::compare_under_fitted_lights;
+use crate::light::fitted_lights::{Photos, compare_under_fitted_lights};
 use crate::light::mse::{LightMse, mean_psnr_error};
 use crate::light::own_lights::{LitSink, LitViews, compare_under_own_lights};
 use crate::materials::score::measure_whole_view;
@@ -46,7 +50,44 @@ pub(crate) fn compare_under_lights(
         compare_under_own_lights(task, reference, truths, base_colors, protocol, each)?;
     }
     if let Some(renderer) = task.renderer.filter(|_| tracks.contains(&Track::Fitted)) {
-        compare_under_fitted_lights(task, renderer, truths, base_colors, protocol, each)?;
+        let photos = Photos::of_renderer(task, renderer)?;
+        compare_under_fitted_lights(task, &photos, truths, base_colors, protocol, each)?;
+    }
+    Ok(())
+}
+
+/// Compares every submission with the photos of a captured scene under lights that are fitted to the input photo, by
+/// protocol number `at`.
+pub(crate) fn score_photos(
+    task: &SceneTask<'_>,
+    rules: &PhotoRules,
+    at: usize,
+    sheets: &mut [Vec<ScoreSheet>],
+) -> Result<(), EvalError> {
+    let is_photo = |view: &&View| view.id.as_str() == INPUT || task.scene.novel_photos.contains_key(&view.id);
+    let task = SceneTask { views: task.views.iter().copied().filter(is_photo).collect(), ..task.clone() };
+    let truths = task.truths()?;
+    let (photos, counted) = Photos::of_capture(&task, &truths, rules)?;
+    let narrowed = |(truth, counted): (&ViewTruth, &Mask)| {
+        let both = |mask: &Mask| Mask::from_fn(mask.width(), mask.height(), |x, y| mask.get(x, y) && counted.get(x, y));
+        ViewTruth { valid: counted.clone(), unobserved: truth.unobserved.as_ref().map(both), ..truth.clone() }
+    };
+    let narrowed: Vec<ViewTruth> = truths.iter().zip(&counted).map(narrowed).collect();
+    // True base colours are not known: every ratio is 1.
+    let black = |truth: &ViewTruth| Picture::filled(truth.valid.width(), truth.valid.height(), LinearRgb([0.0; 3]));
+    let truth: Vec<_> = truths.iter().map(black).collect();
+    let base_colors = BaseColors { predicted: vec![truth.clone(); task.predictions.len()], truth };
+    let meter = LightMeter::new(&task, &narrowed, &task.protocols[at]);
+    let mut each = |submission: usize, lit: LitViews| meter.measure(&lit, &mut sheets[submission][at]);
+    compare_under_fitted_lights(&task, &photos, &truths, &base_colors, &task.protocols[at], &mut each)?;
+    for values in sheets.iter_mut().flat_map(|sheets| &mut sheets[at].score.pictures) {
+        let place = task.views.iter().position(|view| view.id == values.view && values.picture.kind.is_light());
+        let region = place.and_then(|view| {
+            let mut regions = regions(&truths[view]).into_iter();
+            regions.find(|known| (known.region, known.surfaces) == (values.region, values.picture.surfaces))
+        });
+        let all = region.map_or(0, |region| pixel_count(&region.mask));
+        values.left_out = (all > 0).then(|| 1.0 - values.pixels as f64 / all as f64);
     }
     Ok(())
 }

@@ -85,7 +85,7 @@ impl SceneTask<'_> {
         for view in &self.views {
             let Some(regions) = measured.pictures.get(&view.id) else { continue };
             let small = maw_mask(regions);
-            let pictures = material_pictures(self.world, self.atlases, &view.camera, &predictions);
+            let pictures = material_pictures(self.world, self.atlases, &view.camera, &predictions, true);
             for (sheets, pictures) in sheets.iter_mut().zip(pictures) {
                 let of_view = || measured.regions.iter().filter(|region| region.view == view.id);
                 let whole = sums(regions, &pictures.base_color, |LinearRgb(rgb)| rgb.map(f64::from));

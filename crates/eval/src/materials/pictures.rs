@@ -29,7 +29,7 @@ type Values = [f32; 5];
 /// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a
 /// predicted material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's
 /// pictures: whether a few of them or all are looked at is decided by the world's own materials, for all submissions
-/// alike. Rays are traced once for all.
+/// alike, unless they are placeholders, which decide nothing (`all_places`). Rays are traced once for all.
 ///
 /// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces.
 pub fn material_pictures(
@@ -37,10 +37,11 @@ pub fn material_pictures(
     atlases: &[TriangleMesh],
     camera: &Camera,
     submissions: &[&PredictedScene],
+    all_places: bool,
 ) -> Vec<MaterialPictures> {
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
     let rows: Vec<Vec<Vec<Values>>> =
-        (0..height).into_par_iter().map(|y| picture_row(world, atlases, camera, submissions, width, y)).collect();
+        (0..height).into_par_iter().map(|y| picture_row(world, atlases, camera, submissions, all_places, y)).collect();
     (0..submissions.len())
         .map(|index| {
             let pixels = rows.iter().flat_map(|row| row[index].iter().copied()).collect();
@@ -59,20 +60,22 @@ fn picture_row(
     atlases: &[TriangleMesh],
     camera: &Camera,
     submissions: &[&PredictedScene],
-    width: usize,
+    all_places: bool,
     y: usize,
 ) -> Vec<Vec<Values>> {
+    let width = camera.intrinsics.width as usize;
     let coarse = places_through(world, camera, (0..width).flat_map(|x| coarse_subpixels(x, y)));
     let mut rows = vec![Vec::with_capacity(width); submissions.len()];
     for (x, coarse) in coarse.chunks_exact(COARSE_SUBPIXELS).enumerate() {
         let others =
             LazyCell::new(|| places_through(world, camera, (COARSE_SUBPIXELS..SUBPIXELS).map(|at| subpixel(x, y, at))));
         let hit = |at: usize| at.checked_sub(COARSE_SUBPIXELS).map_or_else(|| coarse[at], |rest| others[rest]);
-        let truth = PixelMean::of(|at| {
+        let true_values = |at: usize| {
             let hit = hit(at)?;
             Some(flatness_values(&appearance(world, hit.surface, hit.triangle.0, hit.barycentrics)?))
-        });
-        let places: Vec<Lookup> = (0..truth.looked).filter_map(|at| Lookup::of(&hit(at)?, atlases)).collect();
+        };
+        let looked = if all_places { SUBPIXELS } else { PixelMean::of(true_values).looked };
+        let places: Vec<Lookup> = (0..looked).filter_map(|at| Lookup::of(&hit(at)?, atlases)).collect();
         for (row, submission) in rows.iter_mut().zip(submissions) {
             row.push(mean_of(places.iter().filter_map(|place| values(submission, *place))));
         }

@@ -94,7 +94,7 @@ impl SceneTask<'_> {
         let all: Vec<&PredictedScene> = self.predictions.iter().chain([&true_maps]).collect();
         for (at, view) in self.views.iter().enumerate() {
             (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
-            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all);
+            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all, false);
             let truth = pictures.pop().expect("the truth comes last").base_color;
             each(view, at, &pictures, &truth)?;
             base_colors.truth.push(truth);

@@ -23,11 +23,11 @@ word_enum! {
     Views, a "kind of views":
     /// The valid pixels of the input view.
     Input = "input",
-    /// The valid pixels of the other views from its place.
+    /// The valid pixels of the other views from its place, or of a captured scene's other photos.
     Novel = "novel",
     /// Texels that the input view sees.
     Observed = "observed",
-    /// Pixels of the other views from its place, or texels, that the input view does not see.
+    /// Pixels of those other views, or texels, that the input view does not see.
     Unobserved = "unobserved",
     /// The valid pixels of views from other places.
     Wide = "wide",
@@ -105,10 +105,12 @@ pub const PAPER_HEADLINE: [ResultKey; 4] = [
     psnr(PictureKind::Albedo, Views::Novel),
 ];
 
-pub const CAPTURE_HEADLINE: [ResultKey; 3] = [
+pub const CAPTURE_HEADLINE: [ResultKey; 5] = [
     ResultKey::whole(PictureKind::Measured, Views::Input, Metric::RegionDeltaE),
     ResultKey::whole(PictureKind::Measured, Views::Input, Metric::MawIntensity),
     ResultKey::whole(PictureKind::Measured, Views::Input, Metric::MawChromaticity),
+    psnr(PictureKind::RgbFitted, Views::Input),
+    psnr(PictureKind::RgbFitted, Views::Novel),
 ];
 
 /// A text that is not a key of a result.

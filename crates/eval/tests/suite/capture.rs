@@ -1,4 +1,4 @@
-//! A room of the sample passed off as a capture: its mesh as a PLY without uv, its photo as a 16-bit PNG, its camera in
+//! A room of the sample passed off as a capture: its mesh as a PLY without uv, its photos as 16-bit PNG, their cameras in
 //! every format, and measured colours that are means of the ordinary albedo picture. Scores are those of the ordinary
 //! path.
 
@@ -16,13 +16,17 @@ use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::lens::Lens;
 use mateval_dataset::measured::{MEASUREMENTS_FORMAT, MeasuredArea, MeasuredFile, MeasurementsFile};
 use mateval_dataset::open::Dataset;
-use mateval_dataset::{Camera, SceneId, glb, json};
+use mateval_dataset::{Camera, Finding, SceneId, glb, json};
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_eval::result::key::Region;
+use mateval_eval::result::{PictureValues, ProtocolResult, ResultFile};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::shown::scene_albedo;
+use mateval_eval::truth::true_material;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
+use mateval_light::photo_pixels::PhotoRules;
 use mateval_metrics::measured::color_difference;
 use mateval_prep::build::{BuildOptions, build};
 use mateval_prep::error::PrepError;
@@ -41,6 +45,8 @@ const FORMATS: [(&str, &str); 6] = [
 const SCENE: &str = "living";
 /// The distortion of the photo in the folder `distorted`.
 const K1: f64 = -0.2;
+/// By what the photo of each view is brighter than the ordinary one.
+const FACTORS: [f64; 5] = [1.0, 1.0, 1.0, 0.5, 0.7];
 
 fn ordinary() -> (&'static Dataset, &'static SceneFile) {
     let dataset = sample_dataset::dataset();
@@ -56,14 +62,21 @@ static SOURCE: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("capture_source");
     let (dataset, scene) = ordinary();
     write_mesh(&folder.join("mesh.ply"));
-    let photo = exr_io::read_linear(&dataset.folder(&scene.id).view(&input_view().id).join("rgb.exr")).unwrap();
-    let exposed = photo.map(|LinearRgb(rgb)| rgb.map(|v| (f64::from(v) * scene.exposure) as f32));
-    write_photos(&folder.join("images"), &exposed.map(words));
-    let lens = lens(K1);
-    let bent = Picture::from_fn(exposed.width(), exposed.height(), |x, y| {
-        undistorted(&lens, x, y).map_or([0; 3], |place| words(bilinear(&exposed, place)))
+    let renderer = dataset.photo_renderer(scene).unwrap();
+    let photos = scene.views.iter().zip(FACTORS).map(|(view, factor)| {
+        let photo = exr_io::read_linear(&dataset.folder(&scene.id).render(renderer, &view.id).join("rgb.exr")).unwrap();
+        photo.map(|LinearRgb(rgb)| rgb.map(|v| (f64::from(v) * scene.exposure * factor) as f32))
     });
-    write_photos(&folder.join("distorted"), &bent);
+    let photos: Vec<Picture<[f32; 3]>> = photos.collect();
+    assert_eq!(photos.len(), FACTORS.len());
+    write_photos(&folder.join("images"), photos.iter().map(|photo| photo.map(words)));
+    let lens = lens(K1);
+    let bent = |photo: &Picture<[f32; 3]>| {
+        Picture::from_fn(photo.width(), photo.height(), |x, y| {
+            undistorted(&lens, x, y).map_or([0; 3], |place| words(bilinear(photo, place)))
+        })
+    };
+    write_photos(&folder.join("distorted"), photos.iter().map(bent));
     write_cameras(&folder);
     write_measurements(&folder);
     folder
@@ -73,11 +86,13 @@ fn words(rgb: [f32; 3]) -> [u16; 3] {
     rgb.map(|v| word_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
 }
 
-/// A photo before the input photo, so that the latter's number is 1, and the input photo.
-fn write_photos(folder: &Path, photo: &Picture<[u16; 3]>) {
+/// A photo before the input photo, so that the latter's number is 1, and those of all views, the input photo first.
+fn write_photos(folder: &Path, photos: impl Iterator<Item = Picture<[u16; 3]>>) {
     std::fs::create_dir_all(folder).unwrap();
-    png_io::write_rgb_words(&folder.join("image_0000.png"), &photo.map(|_| [9; 3])).unwrap();
-    png_io::write_rgb_words(&folder.join("image_0001.png"), photo).unwrap();
+    for (photo, number) in photos.zip(1..) {
+        png_io::write_rgb_words(&folder.join("image_0000.png"), &photo.map(|_| [9; 3])).unwrap();
+        png_io::write_rgb_words(&folder.join(format!("image_{number:04}.png")), &photo).unwrap();
+    }
 }
 
 fn lens(k1: f64) -> Lens {
@@ -130,7 +145,7 @@ fn write_mesh(path: &Path) {
     std::fs::write(path, head + &vertices + &faces).unwrap();
 }
 
-/// The input camera as the second of two, in all formats; the first looks the other way.
+/// The cameras of all views from the second on, in all formats; the first looks the other way.
 fn write_cameras(folder: &Path) {
     let camera = input_view().camera;
     let back = Camera::from_rotation(
@@ -138,14 +153,15 @@ fn write_cameras(folder: &Path) {
         camera.position(),
         camera.intrinsics,
     );
-    let (k, cameras) = (camera.intrinsics, [back, camera]);
+    let k = camera.intrinsics;
+    let cameras: Vec<Camera> = std::iter::once(back).chain(ordinary().1.views.iter().map(|view| view.camera)).collect();
     // To OpenCV's axes, as COLMAP, IDR and Objects With Lighting have them.
     let to_opencv = |camera: &Camera| {
         let rotation = (camera.rotation() * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0))).transpose();
         (rotation, -(rotation * camera.position()))
     };
     let name = |at: usize| format!("image_{at:04}.png");
-    let frames: Vec<serde_json::Value> = (0..2)
+    let frames: Vec<serde_json::Value> = (0..cameras.len())
         .map(|at| {
             serde_json::json!({ "file_path": format!("images/{}", name(at)),
             "transform_matrix": cameras[at].world_from_camera })
@@ -166,8 +182,9 @@ fn write_cameras(folder: &Path) {
     [k.width, k.height].iter().for_each(|side| bytes.extend(u64::from(*side).to_le_bytes()));
     numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
     std::fs::write(folder.join("binary/cameras.bin"), bytes).unwrap();
-    let (mut images, mut binary) = (String::new(), 2_u64.to_le_bytes().to_vec());
-    let (mut fipt, mut list) = ("2\n".to_owned(), "2\n".to_owned());
+    let (mut images, mut binary) = (String::new(), (cameras.len() as u64).to_le_bytes().to_vec());
+    let count = format!("{}\n", cameras.len());
+    let (mut fipt, mut list) = (count.clone(), count);
     let mut npz = zip::ZipWriter::new(std::fs::File::create(folder.join("cameras_sphere.npz")).unwrap());
     for (at, camera) in cameras.iter().enumerate() {
         let (rotation, t) = to_opencv(camera);
@@ -313,10 +330,13 @@ static CAPTURES: LazyLock<Dataset> = LazyLock::new(|| {
 });
 
 fn scored(dataset: &Dataset, submission: &Path, protocol: &str) -> ResultFile {
+    scored_by(dataset, submission, Protocol::named(protocol).unwrap())
+}
+
+fn scored_by(dataset: &Dataset, submission: &Path, protocol: Protocol) -> ResultFile {
     let [reason, fix] = ["", ""].map(str::to_owned);
     let lpips = LpipsWeights::Missing { reason, fix };
-    let protocols = vec![Protocol::named(protocol).unwrap()];
-    score(&ScorePlan::new(dataset, vec![submission], protocols, lpips, "test"), &|_| ()).unwrap().remove(0)
+    score(&ScorePlan::new(dataset, vec![submission], vec![protocol], lpips, "test"), &|_| ()).unwrap().remove(0)
 }
 
 /// A submission with one colour for each instance, by the index of the ordinary scene's.
@@ -331,6 +351,31 @@ fn write_painted(dataset: &Dataset, out: &Path, index: impl Fn(&SceneFile, usize
         Ok(())
     })
     .unwrap();
+}
+
+/// A submission with one colour for each instance: the mean of its true base colour, by the index of the ordinary
+/// scene's.
+fn write_means(dataset: &Dataset, out: &Path, index: impl Fn(&SceneFile, usize) -> usize) {
+    let (ordinary_dataset, ordinary) = ordinary();
+    let method = submission::Method::new("means", "");
+    submission::write(dataset, out, false, &method, |scene, instance, folder| {
+        let at = scene.instances.iter().position(|known| known.id == instance.id).unwrap();
+        let known = &ordinary.instances[index(scene, at) - 1];
+        let color = known.atlas.as_ref().map_or([0.5; 3], |atlas| {
+            let folder = ordinary_dataset.folder(&ordinary.id);
+            let map = true_material(&folder, &known.id, atlas.size as usize).unwrap().base_color;
+            let texels = Picture::from_fn(map.width(), map.height(), |x, y| LinearRgb(map.texel(x, y)));
+            mean(&texels, &texels.map(|_| true)).map(|v| v as f32)
+        });
+        let picture = Picture::filled(16, 16, color.map(|v| byte_from_unit(srgb_from_linear(v))));
+        png_io::write_rgb_bytes(&folder.join("base_color.png"), &picture).unwrap();
+        Ok(())
+    })
+    .unwrap();
+}
+
+fn label(scene: &SceneFile, at: usize) -> usize {
+    scene.instances[at].name.strip_prefix("label_").unwrap().parse().unwrap()
 }
 
 fn captured(result: &ResultFile) -> &ProtocolResult {
@@ -372,8 +417,6 @@ fn measured_colours_are_compared_with_means_of_the_albedo_picture() {
     let folder = kept_folder("capture_painted");
     let (of_ordinary, of_captures) = (folder.join("ordinary"), folder.join("captures"));
     write_painted(dataset, &of_ordinary, |_, at| at + 1);
-    let label =
-        |scene: &SceneFile, at: usize| scene.instances[at].name.strip_prefix("label_").unwrap().parse().unwrap();
     write_painted(&CAPTURES, &of_captures, label);
     let albedo = scene_albedo(dataset, ordinary, &[&of_ordinary]).unwrap().remove(0).predicted.remove(0);
     let result = scored(&CAPTURES, &of_captures, "capture-1");
@@ -383,9 +426,8 @@ fn measured_colours_are_compared_with_means_of_the_albedo_picture() {
     let masks: BTreeMap<String, Mask> = regions().into_iter().map(|(index, mask)| (index.to_string(), mask)).collect();
     for region in measured.iter().filter(|region| region.scene.as_str() != "maw") {
         let expected = mean(&albedo, &masks[&region.region]);
-        // A capture's placeholder is flat, so that its pixels are means over 16 places in place of 64, which differ at the
-        // edges of instances. The mask of the distorted photo is drawn in its pixels.
-        let slack = if region.scene.as_str() == "distorted" { 0.04 } else { 3e-3 };
+        // Of a capture a pixel is always a mean over 64 places. The mask of the distorted photo is drawn in its pixels.
+        let slack = if region.scene.as_str() == "distorted" { 0.04 } else { 1e-3 };
         let off = (0..3).map(|c| (region.predicted[c] - expected[c]).abs()).fold(0.0, f64::max);
         assert!(off < slack, "{} {}: {:?} {expected:?}", region.scene, region.region, region.predicted);
         assert!((region.delta_e - color_difference(region.predicted, region.measured)).abs() < 1e-12);
@@ -396,7 +438,8 @@ fn measured_colours_are_compared_with_means_of_the_albedo_picture() {
     let listed = measured.iter().filter(|region| region.scene.as_str() == "idr").map(|region| region.delta_e);
     assert!((of_scene("idr") - listed.sum::<f64>() / 5.0).abs() < 1e-12);
     assert!((of_scene("idr") - of_scene("fipt")).abs() < 1e-3);
-    assert_eq!(captured(&result).summary.len(), 3);
+    // Three of measured colours, and MSE, PSNR and SSIM of the input photo.
+    assert_eq!(captured(&result).summary.len(), 6);
 }
 
 /// The photo is far from the measured colours, which have no light in them, and grey farther than one of the colours.
@@ -416,6 +459,56 @@ fn baselines_run_on_captures_and_the_truth_is_refused() {
     let by_estimate =
         nn::write(&CAPTURES, &folder.join("nn"), false, &EstimateSource::Truth, &NnOptions::default(), &|_| ());
     assert!(by_estimate.unwrap_err().to_string().contains("is captured"));
+}
+
+/// Scenes with the photos of all views: as the ordinary scene, whose seeds it has, and distorted.
+static WITH_NOVEL: LazyLock<Dataset> = LazyLock::new(|| {
+    let novel: Vec<String> = (2..=FACTORS.len()).map(|number| format!("image_{number:04}")).collect();
+    let building = ordinary().1.instances.iter().filter(|instance| instance.role.is_architecture());
+    let building: Vec<String> = building.map(|instance| format!("label_{}", instance.index.0)).collect();
+    let more = format!("novel = {novel:?}\narchitecture = {building:?}");
+    built("novel", &(entry(SCENE, "binary", &more) + &entry("distorted", "distorted.json", &more))).unwrap()
+});
+
+/// The PSNR of each view's fitted light, in the order of the views.
+fn fitted(scores: &ProtocolResult, scene: &str) -> Vec<f64> {
+    let is_wanted =
+        |picture: &&PictureValues| picture.scene.as_str() == scene && picture.picture.to_string() == "rgb_fitted";
+    let whole = scores.pictures.iter().filter(is_wanted).filter(|picture| picture.region == Region::Valid);
+    whole.map(|picture| picture.values[&Metric::Psnr]).collect()
+}
+
+/// Light is fitted as in `paper`, and every other photo has an exposure of its own.
+#[test]
+fn photos_are_compared_as_in_the_paper() {
+    let folder = kept_folder("capture_means");
+    let (of_ordinary, of_captures) = (folder.join("ordinary"), folder.join("captures"));
+    write_means(ordinary().0, &of_ordinary, |_, at| at + 1);
+    write_means(&WITH_NOVEL, &of_captures, label);
+    let paper = scored(ordinary().0, &of_ordinary, "paper");
+    let expected = fitted(&paper.protocols["paper"], SCENE);
+    // Every valid pixel counts, as in `paper`.
+    let mut protocol = Protocol::named("capture-1").unwrap();
+    protocol.photos = Some(PhotoRules { clipped_from: 1e9, depth_jump: 1e9, jump_pixels: 1 });
+    let result = scored_by(&WITH_NOVEL, &of_captures, protocol);
+    let off = |scene: &str, view: usize| fitted(captured(&result), scene)[view] - expected[view];
+    // Undistorting blurs the photo twice.
+    assert!(off(SCENE, 0).abs() < 0.1 && off("distorted", 0).abs() < 0.3, "{} {}", off(SCENE, 0), off("distorted", 0));
+    // An exposure of its own takes away an error of brightness, and nothing else; darker photos have smaller errors.
+    for (view, factor) in FACTORS.iter().enumerate().skip(1) {
+        let range = if *factor < 1.0 { 0.5..4.0 } else { -0.1..0.8 };
+        assert!(range.contains(&off(SCENE, view)), "{view}: {}", off(SCENE, view));
+    }
+    // By the protocol's own rules, pixels are left out and counted.
+    let result = scored(&WITH_NOVEL, &of_captures, "capture-1");
+    let lit = captured(&result).pictures.iter().filter(|picture| picture.picture.kind.is_light());
+    let shares: Vec<f64> = lit.map(|picture| picture.left_out.unwrap()).collect();
+    // Of each scene the input view, and the other views with and without what the input view sees.
+    assert_eq!(shares.len(), 2 * (2 * FACTORS.len() - 1));
+    assert!(shares.iter().all(|share| (0.1..0.8).contains(share)), "{shares:?}");
+    let key = "rgb_fitted.novel.psnr".parse().unwrap();
+    assert!(captured(&result).summary[&key] > 12.0 && captured(&result).fits.len() == 2);
+    assert!(captured(&result).noise[&SceneId::new(SCENE).unwrap()].contains_key(&key));
 }
 
 /// No other protocol has a value for a capture, and `capture-1` has none for another scene.
@@ -474,6 +567,23 @@ fn captures_that_cannot_be_scored_are_refused_with_the_reason() {
     refused("capture_up", &plain("up = [0, 0, 0]"), "expected a direction");
     let camera = plain("").replace("id = \"a\"", "id = \"a\"\ncamera = { seed = 1 }");
     refused("capture_camera", &camera, "`camera` does not go with `capture`");
+    // Photos that are missing, named twice, fewer than the cameras or of another size.
+    refused("capture_novel", &plain("novel = [\"9\"]"), "no camera took a photo '9'");
+    refused("capture_twice", &plain("novel = [\"image_0001.png\"]"), "the photo 'image_0001.png' is named twice");
+    std::fs::create_dir_all(SOURCE.join("fewer")).unwrap();
+    std::fs::copy(SOURCE.join("images/image_0001.png"), SOURCE.join("fewer/image_0001.png")).unwrap();
+    let fewer = |cameras: &str, more: &str| entry("a", cameras, more).replace("\"images\"", "\"fewer\"");
+    let absent = fewer("transforms.json", "novel = [\"image_0002\"]");
+    refused("capture_fewer", &absent, "'fewer' does not hold the photo");
+    refused("capture_numbered", &fewer("cam.txt", ""), "6 cameras are numbered, and the folder holds 1 photos");
+    png_io::write_rgb_words(&SOURCE.join("fewer/image_0003.png"), &Picture::filled(32, 24, [30_000; 3])).unwrap();
+    let thumbnail = fewer("transforms.json", "novel = [\"image_0003\"]");
+    refused("capture_thumbnail", &thumbnail, "'fewer/image_0003.png' is 32x24, and its camera states 64x48");
+    // A camera in another world than the mesh.
+    write_posed("away.json", |camera| {
+        Camera::from_rotation(camera.rotation(), camera.position() + DVec3::X * 1e4, camera.intrinsics)
+    });
+    refused("capture_away", &entry("a", "away.json", ""), "or check that mesh and cameras share a world");
     // Regions of a picture of another size, and of another photo.
     let folder = SOURCE.clone();
     let mut file: MeasurementsFile = json::read(&folder.join("measured.json")).unwrap();
@@ -492,6 +602,73 @@ fn captures_that_cannot_be_scored_are_refused_with_the_reason() {
         &with("measured", "measured.json", "others.json"),
         "no region is of the photo 'image_0001.png'",
     );
+}
+
+/// Writes `transforms.json` with other poses.
+fn write_posed(file: &str, pose: impl Fn(Camera) -> Camera) {
+    let mut transforms: serde_json::Value = json::read(&SOURCE.join("transforms.json")).unwrap();
+    let cameras = ordinary().1.views.iter().map(|view| view.camera);
+    for (frame, camera) in transforms["frames"].as_array_mut().unwrap().iter_mut().skip(1).zip(cameras) {
+        frame["transform_matrix"] = serde_json::json!(pose(camera).world_from_camera);
+    }
+    std::fs::write(SOURCE.join(file), transforms.to_string()).unwrap();
+}
+
+/// Poses of another convention are recognised by the edges of the photo; those that are right give no warning.
+#[test]
+fn poses_of_another_convention_are_named() {
+    let half = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+    write_posed("flipped.json", |camera| {
+        Camera::from_rotation(camera.rotation() * half, camera.position(), camera.intrinsics)
+    });
+    write_posed("inverted.json", |camera| {
+        let inverse = camera.rotation().transpose();
+        Camera::from_rotation(inverse, -(inverse * camera.position()), camera.intrinsics)
+    });
+    let said = |cameras: &str| -> Vec<String> {
+        match built(&format!("capture_pose_{cameras}"), &entry("a", cameras, "")) {
+            Ok(dataset) => {
+                let of_poses = |finding: &&Finding| finding.code == "pose_convention";
+                dataset.scenes[0].findings.iter().filter(of_poses).map(|finding| finding.message.clone()).collect()
+            }
+            Err(refused) => vec![refused.to_string()],
+        }
+    };
+    assert_eq!(said("transforms.json"), Vec::<String>::new());
+    assert!(said("flipped.json")[0].contains("with the camera's y and z axes flipped"));
+    assert!(said("inverted.json")[0].contains("with the matrix inverted,"));
+}
+
+/// The undistorted picture of a pincushion does not hold the middle of the photo's left edge: its region is left out, or
+/// alone refused.
+#[test]
+fn regions_outside_of_the_picture_are_left_out() {
+    let transforms = std::fs::read_to_string(SOURCE.join("distorted.json")).unwrap();
+    std::fs::write(SOURCE.join("pincushion.json"), transforms.replace("\"k1\":-0.2", "\"k1\":2.0")).unwrap();
+    let values = |x: usize, y: usize| match x {
+        0 if (20..28).contains(&y) => 20,
+        20..30 => 10,
+        _ => 0,
+    };
+    png_io::write_grey_bytes(&SOURCE.join("edge.png"), &Picture::from_fn(64, 48, values)).unwrap();
+    let area = |name: &str, value: u16| MeasuredArea {
+        name: name.to_owned(),
+        photo: "image_0001".to_owned(),
+        mask: "edge.png".to_owned(),
+        value,
+        color: [0.5; 3],
+        standard_error: None,
+    };
+    let with = |file: &str, regions: Vec<MeasuredArea>| {
+        json::write(&SOURCE.join(file), &MeasurementsFile { format: MEASUREMENTS_FORMAT.to_owned(), regions }).unwrap();
+        built(&format!("capture_{file}"), &entry("a", "pincushion.json", "").replace("measured.json", file))
+    };
+    let dataset = with("both.json", vec![area("middle", 10), area("edge", 20)]).unwrap();
+    let unseen: Vec<&Finding> =
+        dataset.scenes[0].findings.iter().filter(|finding| finding.code == "unseen_region").collect();
+    assert!(unseen.len() == 1 && unseen[0].message.contains("'edge'"), "{unseen:?}");
+    let refused = with("edge.json", vec![area("edge", 20)]).err().unwrap().to_string();
+    assert!(refused.contains("none of the 1 regions shows a valid pixel"), "{refused}");
 }
 
 /// Millimetres give a warning that names the key; stated as `scale`, they are metres again.

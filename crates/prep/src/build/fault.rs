@@ -40,10 +40,15 @@ pub enum BuildFault {
     Measured(RegionFault),
     /// The input view shows no instance that has an atlas.
     #[error(
-        "the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera{}",
+        "the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera{}{}",
+        if *captured { ", or check that mesh and cameras share a world, a unit and a convention of axes" } else { "" },
         causes(findings)
     )]
-    NothingSeen { findings: Vec<Finding> },
+    NothingSeen {
+        /// Whether the camera is that of a captured room.
+        captured: bool,
+        findings: Vec<Finding>,
+    },
     #[error("{message}; at most {:.0} % may be {allowed}{}", 100.0 * most, causes(findings))]
     TooMuch {
         message: String,

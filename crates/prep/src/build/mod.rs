@@ -3,7 +3,7 @@
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
 //! reads the source and chooses the input camera, and `redress` gives it other materials if the recipe says so; `plan`
 //! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one and the colours that were
-//! `measured` in it, converts the materials and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
+//! `measured` in it, compares its `poses` with it, converts the materials and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
 //! become a wrong truth; [`materials`] unwraps every instance and bakes its material ([`baking`]); meshes and
 //! `scene.json` are written here. [`finish`] makes the `twins` of rendered scenes
 //! and writes the files of the whole dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a
@@ -19,6 +19,7 @@ pub mod parts;
 mod photo;
 mod pictures;
 mod plan;
+mod poses;
 mod refusals;
 mod source;
 pub(crate) mod start;
@@ -214,6 +215,7 @@ fn build_scene(
     if let Some(photo) = &plan.photo {
         photo.write(folder, &plan.views[0], entry.exposure)?;
     }
+    plan.novel_photos.iter().try_for_each(|(view, photo)| photo.write_truth(folder, view))?;
     if let Some(measured) = plan.measured.take() {
         plan.findings.extend(measured.write(&entry.id, folder, &plan.views[0])?);
     }
@@ -333,6 +335,7 @@ fn write_scene_file(
         materials: recipe.materials,
         exposure: entry.exposure,
         photo: plan.photo.map(|photo| photo.listed),
+        novel_photos: plan.novel_photos.into_iter().map(|(view, photo)| (view, photo.listed)).collect(),
         redressed: plan.redressed,
         views: plan.views,
         instances,

@@ -1,4 +1,5 @@
-//! A photo from elsewhere, which takes the place of a rendered input picture: its file, size and exposure.
+//! A photo from elsewhere, which takes the place of a rendered picture: its file, size and exposure. Other photos of a
+//! captured room than the input photo belong to its truth.
 
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::dataset::{Photo, PhotoEncoding, View};
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::lens::Lens;
-use mateval_dataset::{Finding, Severity};
+use mateval_dataset::{Finding, Severity, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, LookedFor, SourceFolder};
 use mateval_image::exr_io::{self, Precision};
@@ -17,6 +18,7 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_sources::source_scene::{CapturedPhoto, SourceScene};
 
 use super::fault::{BuildFault, PhotoFault};
+use super::source::placed_view;
 use crate::error::PrepError;
 use crate::recipe::RecipeScene;
 use crate::views::write_preview;
@@ -59,14 +61,33 @@ pub(super) fn read_photo(
         }
         (None, None) => return Ok(None),
     };
-    if photo.transparent_share > 0.0 {
-        let message = format!("{:.1} % of its pixels have an alpha below 1", 100.0 * photo.transparent_share);
-        let action = "used their colours as they are stored";
-        let file = photo.listed.file.clone();
-        scene.read.findings.push(Finding::new(Severity::Warning, "transparent_photo", file, "", message, action));
-        scene.read.findings.sort();
-    }
+    scene.read.findings.extend(photo.transparency());
+    scene.read.findings.sort();
     Ok(Some(photo))
+}
+
+/// Reads the other photos of a captured room as pictures of their views, `novel_1` and so on, at the size of the input
+/// view's, and lists their files among the source's. `root` is the folder of the recipe's paths.
+pub(super) fn read_novel_photos(
+    entry: &RecipeScene,
+    root: &Path,
+    scene: &mut SourceScene,
+) -> Result<Vec<(View, ScenePhoto)>, PrepError> {
+    let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
+    let Intrinsics { width, height, .. } = scene.camera.intrinsics;
+    let mut all = Vec::new();
+    for ((path, camera), number) in std::mem::take(&mut scene.novel).into_iter().zip(1..) {
+        let (captured, file) = read_captured(root, &path, camera.lens).map_err(fault)?;
+        scene.read.files.extend(file);
+        let intrinsics = pinhole(&captured, [width, height]).map_err(fault)?;
+        let camera = Camera::from_rotation(camera.rotation, camera.position, intrinsics);
+        let photo = captured_photo(&captured, &camera, entry.exposure).map_err(fault)?;
+        scene.read.findings.extend(photo.transparency());
+        all.push((placed_view(&format!("novel_{number}"), camera), photo));
+    }
+    scene.read.files.hashes.dedup();
+    scene.read.findings.sort();
+    Ok(all)
 }
 
 /// Reads the photo at `path` in the folder `root`, whose camera has this lens. Returns also the file with its hash.
@@ -163,6 +184,23 @@ fn fits(photo: [u32; 2], [width, height]: [u32; 2]) -> bool {
 }
 
 impl ScenePhoto {
+    pub(super) fn picture(&self) -> &Picture<LinearRgb> {
+        &self.picture
+    }
+
+    fn transparency(&self) -> Option<Finding> {
+        let message = format!("{:.1} % of its pixels have an alpha below 1", 100.0 * self.transparent_share);
+        let action = "used their colours as they are stored";
+        let file = self.listed.file.clone();
+        (self.transparent_share > 0.0)
+            .then(|| Finding::new(Severity::Warning, "transparent_photo", file, "", message, action))
+    }
+
+    /// Writes `photo.exr` of another view than the input view, among the ground truth.
+    pub(super) fn write_truth(&self, folder: &SceneFolder, view: &ViewId) -> Result<(), PrepError> {
+        Ok(exr_io::write_linear(&folder.novel_photo(view), &self.picture, Precision::Float)?)
+    }
+
     /// Writes `rgb.exr` and `rgb.png` of the input view.
     pub(super) fn write(&self, folder: &SceneFolder, input: &View, exposure: f64) -> Result<(), PrepError> {
         let place = folder.view(&input.id);

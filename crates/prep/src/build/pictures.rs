@@ -29,7 +29,10 @@ impl Seen {
         if self.input_pixels.iter().any(|count| *count > 0) {
             return Ok(self);
         }
-        Err(PrepError::scene(scene)(BuildFault::NothingSeen { findings: above_notes(&plan.findings) }))
+        Err(PrepError::scene(scene)(BuildFault::NothingSeen {
+            captured: !plan.source.kind.states_materials(),
+            findings: above_notes(&plan.findings),
+        }))
     }
 }
 

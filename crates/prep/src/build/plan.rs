@@ -1,5 +1,6 @@
 //! Plans a scene before anything is written: its instances, parts and views.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use mateval_dataset::dataset::{Redressed, SceneSource, SourceFile, TrueMaterials
 use mateval_dataset::material::{ClassifiedPart, MaterialClass};
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::reference::SourceMaterials;
-use mateval_dataset::{Finding, SceneLights, TriangleMesh};
+use mateval_dataset::{Camera, Finding, SceneLights, TriangleMesh, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, SourceScene};
@@ -17,7 +18,8 @@ use super::fault::BuildFault;
 use super::labels::{MAX_LABEL_BYTES, read_labels};
 use super::measured::{SceneRegions, read_regions};
 use super::parts::{InstanceEntry, PartEntry, PartSplit, list_instances};
-use super::photo::{ScenePhoto, read_photo};
+use super::photo::{ScenePhoto, read_novel_photos, read_photo};
+use super::poses::other_convention;
 use super::source::views_of;
 use super::wide_views::wide_views;
 use crate::conversion::convert;
@@ -42,6 +44,8 @@ pub(super) struct Plan {
     pub(super) views: Vec<View>,
     /// The input picture, where it is not rendered.
     pub(super) photo: Option<ScenePhoto>,
+    /// The photos of a captured scene's other views.
+    pub(super) novel_photos: BTreeMap<ViewId, ScenePhoto>,
     /// The measured colours of a captured scene.
     pub(super) measured: Option<SceneRegions>,
     /// What is public of a redressed scene.
@@ -79,9 +83,16 @@ pub(super) fn make_plan(
     let classes = classified_parts(&own, &source_scene.read.origins);
     let part_splits = part_splits(entry, source, &instances, own, &mut source_scene.read)?;
     let photo = read_photo(entry, source, &mut source_scene)?;
+    let novel = read_novel_photos(entry, source, &mut source_scene)?;
     let mut views = views_of(recipe, source_scene.camera);
+    if source_scene.captured.is_some() {
+        // No score could compare with views that nobody took a photo of.
+        views.truncate(1);
+        views.extend(novel.iter().map(|(view, _)| view.clone()));
+    }
+    let novel_photos = novel.into_iter().map(|(view, photo)| (view.id, photo)).collect();
     let measured = read_regions(entry, source, &mut source_scene, &views[0])?;
-    let SourceScene { kind, states_roughness, states_metallic, house, file, read, camera, captured: _ } = source_scene;
+    let SourceScene { kind, states_roughness, states_metallic, house, file, read, camera, captured, .. } = source_scene;
     let mut findings = read.findings;
     let (scene, source_materials) = match recipe.materials {
         TrueMaterials::Source => (read.scene, None),
@@ -92,8 +103,17 @@ pub(super) fn make_plan(
         }
     };
     let scene = Arc::new(scene);
+    if let (Some(room), Some(photo)) = (&entry.capture, &photo) {
+        let others = source_scene
+            .other_poses
+            .iter()
+            .map(|(what, pose)| (*what, Camera::from_rotation(pose.rotation, pose.position, camera.intrinsics)));
+        let world = World::new(scene.clone())?;
+        let file = room.cameras.to_string_lossy();
+        findings.extend(other_convention(&world, photo.picture(), &camera, others, &file));
+    }
     // After the scene is complete, so that wide views never add to it: the other views stay as they are.
-    if let Some(wide) = &recipe.wide {
+    if let Some(wide) = recipe.wide.as_ref().filter(|_| captured.is_none()) {
         let scored: Vec<bool> =
             scene.surfaces.iter().map(|surface| scene.materials[surface.material.0].has_appearance()).collect();
         let (found, lost) = wide_views(wide, &World::new(scene.clone())?, &camera, &scored, &file);
@@ -120,6 +140,7 @@ pub(super) fn make_plan(
         classes,
         views,
         photo,
+        novel_photos,
         measured,
         redressed: None,
         findings,

@@ -111,6 +111,8 @@ fn scene_of_file(
         read,
         camera,
         captured: None,
+        novel: Vec::new(),
+        other_poses: Vec::new(),
     }
 }
 
@@ -128,12 +130,13 @@ fn captured_scene(
         cameras: path(&room.cameras),
         photos: path(&room.photos),
         input: room.input.clone(),
+        novel: room.novel.clone(),
         labels: room.labels.as_deref().map(path),
         scale: room.scale,
         up: DVec3::from_array(room.up),
         architecture: room.architecture.clone(),
     };
-    let Capture { mut read, camera, photo } = capture::read(&files)?;
+    let Capture { mut read, input: (photo, camera), novel, other_poses } = capture::read(&files)?;
     let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
     let (captured, file) = read_captured(root, &photo, camera.lens).map_err(fault)?;
     read.files.extend(file);
@@ -144,7 +147,7 @@ fn captured_scene(
     // Photos of one room are in one folder, which names the house without `house`.
     let house = room.mesh.parent().and_then(Path::file_name);
     let scene = scene_of_file(read, SourceKind::Capture, house, entry, &room.mesh, camera);
-    Ok(SourceScene { file: files.mesh, captured: Some(captured), ..scene })
+    Ok(SourceScene { file: files.mesh, captured: Some(captured), novel, other_poses, ..scene })
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
@@ -328,10 +331,14 @@ fn room_camera(
     }
 }
 
+/// The view of a camera that is not turned from another.
+pub(super) fn placed_view(id: &str, camera: Camera) -> View {
+    View { id: ViewId::new(id).expect("our own ids are ids"), x_deg: 0.0, y_deg: 0.0, camera, wide: None }
+}
+
 /// The input view, then the novel views: the input camera, turned by each of the recipe's offsets.
 pub(super) fn views_of(recipe: &Recipe, camera: Camera) -> Vec<View> {
-    let input =
-        View { id: ViewId::new(INPUT).expect("our own id is an id"), x_deg: 0.0, y_deg: 0.0, camera, wide: None };
+    let input = placed_view(INPUT, camera);
     let turned = recipe.views.iter().map(|offset| View {
         id: offset.id.clone(),
         x_deg: offset.x_deg,

@@ -87,6 +87,9 @@ pub struct CapturedRoom {
     pub photos: PathBuf,
     /// The name of the input photo, with or without its ending.
     pub input: String,
+    /// The names of photos of other views, with which renders of submissions are compared.
+    #[serde(default)]
+    pub novel: Vec<String>,
     /// The measured colours: a file of ours, or a table of MAW's.
     pub measured: PathBuf,
     /// A NumPy file with the number of an instance for each triangle of the mesh.

@@ -381,6 +381,7 @@ mod tests {
             materials: TrueMaterials::Converted,
             exposure: 1.0,
             photo: None,
+            novel_photos: BTreeMap::new(),
             redressed: None,
             views: Vec::new(),
             instances: things.iter().enumerate().map(|(at, thing)| instance(at, thing)).collect(),

@@ -192,7 +192,7 @@ fn check_scene(root: &Path, folder: &SceneFolder, dataset: &DatasetFile, id: &st
     let Some(world) = faults.read("ground_truth/reference", world) else { return };
     pictures::check(folder, &scene, &meshes, &world, faults);
     match (&dataset.photo_renderer, &scene.photo) {
-        (_, Some(photo)) => renders::check_photo(folder, &scene, photo, faults),
+        (_, Some(photo)) => renders::check_photos(folder, &scene, photo, faults),
         (Some(renderer), None) => renders::check_renders(folder, &scene, renderer, faults),
         (None, None) => {}
     }

@@ -81,21 +81,27 @@ pub(super) fn check_renders(folder: &SceneFolder, scene: &SceneFile, renderer: &
     }
 }
 
-/// Reports a photo whose file the source does not list, renders that should not exist, and an input picture that is
-/// missing, unreadable or of another size than the camera's.
-pub(super) fn check_photo(folder: &SceneFolder, scene: &SceneFile, photo: &Photo, faults: &mut Faults) {
-    if !scene.source.files.iter().any(|file| file.path == photo.file) {
-        faults.add("unlisted_photo", "scene.json", "/photo/file", "expected one of the files in /source/files");
-    }
+/// Reports photos whose file the source does not list, renders that should not exist, and pictures of photos that are
+/// missing, unreadable or of another size than the camera's. Those of novel views are checked if the ground truth exists.
+pub(super) fn check_photos(folder: &SceneFolder, scene: &SceneFile, photo: &Photo, faults: &mut Faults) {
     if folder.truth().join("renders").exists() {
         faults.add("unexpected_renders", "ground_truth/renders", "", "expected none, since the scene has a photo");
     }
-    let Some(input) = scene.view(INPUT) else { return };
-    let file = format!("views/{INPUT}/rgb.exr");
-    let Some(shown) = faults.read(&file, exr_io::read_linear(&folder.view(&input.id).join("rgb.exr"))) else { return };
-    let k = input.camera.intrinsics;
-    if (shown.width(), shown.height()) != (k.width as usize, k.height as usize) {
-        faults.add("wrong_size", &file, "", format!("expected {}x{} pixels", k.width, k.height));
+    let input = scene.view(INPUT).map(|input| (input, photo, format!("views/{INPUT}/rgb.exr"), "/photo".to_owned()));
+    let novel = scene.views.iter().filter_map(|view| Some((view, scene.novel_photos.get(&view.id)?)));
+    let novel = novel.filter(|_| folder.truth().is_dir()).map(|(view, photo)| {
+        (view, photo, format!("ground_truth/views/{}/photo.exr", view.id), format!("/novel_photos/{}", view.id))
+    });
+    for (view, photo, file, place) in input.into_iter().chain(novel) {
+        if !scene.source.files.iter().any(|file| file.path == photo.file) {
+            let message = "expected one of the files in /source/files";
+            faults.add("unlisted_photo", "scene.json", format!("{place}/file"), message);
+        }
+        let Some(shown) = faults.read(&file, exr_io::read_linear(&folder.path().join(&file))) else { continue };
+        let k = view.camera.intrinsics;
+        if (shown.width(), shown.height()) != (k.width as usize, k.height as usize) {
+            faults.add("wrong_size", &file, "", format!("expected {}x{} pixels", k.width, k.height));
+        }
     }
 }
 

@@ -84,7 +84,14 @@ fn check_views(scene: &SceneFile, faults: &mut Faults) {
                 "expected focal lengths and a size above 0, and a finite principal point",
             );
         }
-        check_place(view, &input.camera, at, faults);
+        // Where a photo was taken, and with which lens, is its own.
+        if !scene.novel_photos.contains_key(&view.id) {
+            check_place(view, &input.camera, at, faults);
+        }
+    }
+    for view in scene.novel_photos.keys().filter(|id| scene.view(id.as_str()).is_none()) {
+        let message = format!("the scene has no view '{view}'");
+        faults.add("dangling_reference", SCENE_FILE, format!("/novel_photos/{view}"), message);
     }
 }
 

@@ -416,6 +416,7 @@ mod tests {
             lighting: None,
             region: Region::Valid,
             pixels: 1,
+            left_out: None,
             values: BTreeMap::from([(Metric::Psnr, number)]),
             mse_error: None,
             exact: false,

@@ -415,6 +415,7 @@ pub(crate) mod tests {
             lighting: None,
             region: Region::Valid,
             pixels: 1,
+            left_out: None,
             values: BTreeMap::from([(Metric::Psnr, *psnr), (Metric::Mse, 10_f64.powf(-psnr / 10.0))]),
             mse_error: None,
             exact: false,

@@ -31,6 +31,28 @@ pub struct CapturedCamera {
     pub lens: Lens,
 }
 
+impl CapturedCamera {
+    /// The poses that the camera has if the file follows another convention than it should, or if the mesh was turned and
+    /// the cameras were not, each with what was done to the stated pose.
+    pub fn other_poses(&self) -> impl Iterator<Item = (&'static str, Self)> {
+        let posed = |rotation: DMat3, position: DVec3| Self { rotation, position, ..self.clone() };
+        let half = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        let inverse = self.rotation.transpose();
+        let back = -(inverse * self.position);
+        let quarter = DMat3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        let turned = |turn: DMat3| posed(turn * self.rotation, turn * self.position);
+        [
+            ("the camera's y and z axes flipped", posed(self.rotation * half, self.position)),
+            ("the matrix inverted", posed(inverse, back)),
+            ("the matrix inverted, then the camera's y and z axes flipped", posed(inverse * half, back)),
+            ("the camera's y and z axes flipped before and after inverting", posed(half * inverse * half, half * back)),
+            ("their world turned by 90 degrees about x", turned(quarter)),
+            ("their world turned by -90 degrees about x", turned(quarter.transpose())),
+        ]
+        .into_iter()
+    }
+}
+
 /// How a file of cameras names the photo of a camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PhotoName {

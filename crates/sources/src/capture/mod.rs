@@ -23,7 +23,7 @@ use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceS
 use mateval_dataset::{Role, SceneLights, TriangleMesh};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
-use mateval_files::untrusted::hint;
+use mateval_files::untrusted::{hint, quoted};
 use mateval_image::npy_io;
 
 use crate::gltf;
@@ -65,6 +65,8 @@ pub struct CaptureFiles {
     pub photos: String,
     /// The input photo: its name, with or without its ending.
     pub input: String,
+    /// The photos of other views, named alike.
+    pub novel: Vec<String>,
     /// A NumPy file with an integer for each triangle of the mesh, the number of its instance.
     pub labels: Option<String>,
     /// Metres for each unit of mesh and cameras.
@@ -80,10 +82,12 @@ pub struct CaptureFiles {
 pub struct Capture {
     /// Its camera is left out, since it depends on the size of the photo.
     pub read: FileScene,
-    /// The camera of the input photo.
-    pub camera: CapturedCamera,
-    /// The input photo, relative to the folder.
-    pub photo: String,
+    /// The input photo, relative to the folder, and its camera.
+    pub input: (String, CapturedCamera),
+    /// The photos of other views, in the order in which they are named.
+    pub novel: Vec<(String, CapturedCamera)>,
+    /// The input camera by [`CapturedCamera::other_poses`].
+    pub other_poses: Vec<(&'static str, CapturedCamera)>,
 }
 
 /// A mesh in the file's own world, with names for its instances.
@@ -104,7 +108,7 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
         (relative(&files.mesh)?, relative(&files.cameras)?, relative(&files.photos)?);
     let mut log = Log::new(mesh.clone(), MOST_FINDINGS);
 
-    // The cameras, and of them that of the input photo.
+    // The cameras, and of them those of the named photos.
     let in_cameras = |fault: Invalid| fault.in_file(&root.join(&camera_path));
     let cameras = read_cameras(&mut folder, &camera_path).map_err(in_cameras)?;
     if cameras.is_transformed {
@@ -114,9 +118,17 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
         log.push(mateval_dataset::Severity::Warning, "applied_transform", &camera_path, "", message, action);
     }
     let photos = photos_of(&root.join(&photo_folder));
-    let input = cameras::find(&cameras.all, &photos, &files.input).map_err(in_cameras)?;
-    let mut camera = cameras.all[input].clone();
-    let photo = photo_path(&folder, &photo_folder, &photos, &camera.photo).map_err(in_cameras)?;
+    let mut named: Vec<usize> = Vec::new();
+    let mut taken = Vec::new();
+    for name in std::iter::once(&files.input).chain(&files.novel) {
+        let at = cameras::find(&cameras.all, &photos, name).map_err(in_cameras)?;
+        if named.contains(&at) {
+            return Err(in_cameras(Invalid(format!("the photo {} is named twice; name each once", quoted(name)))));
+        }
+        named.push(at);
+        let camera = cameras.all[at].clone();
+        taken.push((photo_path(&folder, &photo_folder, &photos, &camera.photo).map_err(in_cameras)?, camera));
+    }
 
     // The mesh, in the world of all scenes.
     let in_mesh = |fault: Invalid| fault.in_file(&root.join(&mesh));
@@ -127,10 +139,13 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
         None => in_pieces(scan, &mut log),
     };
     let turn = DMat3::from_quat(DQuat::from_rotation_arc(files.up.normalize(), DVec3::Y));
-    let shift_m = shift_of(turn * camera.position * files.scale);
+    let shift_m = shift_of(turn * taken[0].1.position * files.scale);
     report_shift(shift_m, &mut log);
-    camera.rotation = turn * camera.rotation;
-    camera.position = turn * camera.position * files.scale - shift_m;
+    let mut other_poses: Vec<_> = taken[0].1.other_poses().collect();
+    for camera in taken.iter_mut().map(|(_, camera)| camera).chain(other_poses.iter_mut().map(|(_, camera)| camera)) {
+        camera.rotation = turn * camera.rotation;
+        camera.position = turn * camera.position * files.scale - shift_m;
+    }
     let place = |position: DVec3| (turn * position * files.scale - shift_m).as_vec3();
     let scene = scene_of(&scan, place, &mut log);
     check_sides(&scene, &mut log);
@@ -149,7 +164,8 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
         missing: Missing::default(),
         files,
     };
-    Ok(Capture { read, camera, photo })
+    let input = taken.remove(0);
+    Ok(Capture { read, input, novel: taken, other_poses })
 }
 
 /// The names of the photos in a folder, in order.
@@ -433,6 +449,7 @@ mod tests {
             cameras: "transforms.json".to_owned(),
             photos: "photos".to_owned(),
             input: "1".to_owned(),
+            novel: Vec::new(),
             labels: None,
             scale: 1.0,
             up: DVec3::Y,
@@ -450,14 +467,14 @@ mod tests {
         let (_folder, files) = written("a.obj", OBJ.as_bytes());
         let files = CaptureFiles { up: DVec3::Z, scale: 2.0, architecture: vec!["floor".to_owned()], ..files };
         let capture = read(&files).unwrap();
-        assert_eq!((names(&capture), capture.photo.as_str()), (vec!["floor", "table"], "photos/1.png"));
+        assert_eq!((names(&capture), capture.input.0.as_str()), (vec!["floor", "table"], "photos/1.png"));
         let roles: Vec<bool> = capture.read.origins.iter().map(|origin| origin.role.is_architecture()).collect();
         assert_eq!(roles, [true, false]);
         // (x, y, z) with +Z up becomes (x, z, -y).
         let table = &capture.read.scene.surfaces[1].mesh;
         assert!(table.positions[..4].iter().all(|position| (position.y - 2.0).abs() < 1e-6));
-        assert!(capture.camera.position.abs_diff_eq(DVec3::new(2.0, 6.0, -4.0), 1e-12));
-        assert!(capture.camera.rotation.y_axis.abs_diff_eq(DVec3::NEG_Z, 1e-12));
+        assert!(capture.input.1.position.abs_diff_eq(DVec3::new(2.0, 6.0, -4.0), 1e-12));
+        assert!(capture.input.1.rotation.y_axis.abs_diff_eq(DVec3::NEG_Z, 1e-12));
         assert!(capture.read.origins.iter().all(|origin| !origin.stated.base_color));
         let unknown = read(&CaptureFiles { architecture: vec!["wall".to_owned()], ..files }).unwrap_err().to_string();
         assert!(unknown.contains("no instance 'wall'; the first are 'floor', 'table'"), "{unknown}");
@@ -490,7 +507,7 @@ mod tests {
     fn the_photo_is_found_by_its_name_or_refused() {
         let (folder, files) = written("a.obj", OBJ.as_bytes());
         std::fs::rename(folder.path().join("photos/1.png"), folder.path().join("photos/1.exr")).unwrap();
-        assert_eq!(read(&files).unwrap().photo, "photos/1.exr");
+        assert_eq!(read(&files).unwrap().input.0, "photos/1.exr");
         std::fs::remove_file(folder.path().join("photos/1.exr")).unwrap();
         assert!(read(&files).unwrap_err().to_string().contains("'photos' does not hold the photo"));
         let outside = read(&CaptureFiles { mesh: "../a.obj".to_owned(), ..files }).unwrap_err().to_string();

@@ -55,6 +55,8 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
         },
         camera: views[0],
         captured: None,
+        novel: Vec::new(),
+        other_poses: Vec::new(),
     }
 }
 
