@@ -140,15 +140,15 @@ fn remembered(rooms: &Rooms, dataset: &str) -> PathBuf {
     out
 }
 
-/// The same of somebody who also fits the remembered colours to the photo: of each instance and channel, the scale and offset
-/// that come nearest to what `nn` makes of the photo. `flat` has a scale of 0, so that nothing is remembered.
+/// The submission of somebody who also fits the remembered colours to the photo: each instance and channel has the scale and
+/// offset that bring them nearest to the colours of `nn`. `flat` has a scale of 0, so that nothing is remembered.
 fn recolored(rooms: &Rooms, dataset: &str, flat: bool) -> PathBuf {
     let out = rooms.path(&format!("recolored_{dataset}_{flat}"));
     copy_folder(&rooms.honest("median", dataset, "delight"), &out);
     let seen = rooms.honest("nn", dataset, "delight");
     for (instance, colors) in undressed_atlases(rooms, dataset) {
         let seen = seen.join("scenes/room").join(&instance).join("base_color.png");
-        let Ok(seen) = read_texture(&seen, Encoding::Srgb, Wrap::Clamp) else { continue };
+        let seen = read_texture(&seen, Encoding::Srgb, Wrap::Clamp).unwrap();
         let size = colors.width();
         let uv =
             |at: usize| [(at % size) as f32 + 0.5, size as f32 - (at / size) as f32 - 0.5].map(|v| v / size as f32);
@@ -164,7 +164,7 @@ fn recolored(rooms: &Rooms, dataset: &str, flat: bool) -> PathBuf {
     out
 }
 
-/// The scale and offset of least squares; a scale of 0 where there is only one abscissa.
+/// Scale and offset of the line of least squares; the scale is 0 if all first values are equal.
 fn line(pairs: &[(f32, f32)]) -> (f32, f32) {
     let count = pairs.len() as f64;
     let (x, y) = pairs.iter().fold((0.0, 0.0), |sum, pair| (sum.0 + f64::from(pair.0), sum.1 + f64::from(pair.1)));
@@ -193,7 +193,7 @@ fn remembered_textures_fall_below_the_medians() {
     assert!(undressed.0 > undressed.1.max(undressed.2) && redressed.0 < redressed.2, "{all}");
     assert!((undressed.1 - redressed.1).abs() < (undressed.0 - redressed.0) / 3.0, "{all}");
 
-    // Memory that is fitted to the photo is no better than the fit alone.
+    // Remembered colours that are fitted to the photo are no better than the fit alone.
     let [fitted, alone] = [false, true].map(|flat| rooms.psnr(&recolored(rooms, "public", flat), "redressed_scored"));
     assert!(fitted < alone + 0.1, "fitted memory {fitted}, fit alone {alone}; {all}");
 }

@@ -14,7 +14,7 @@ use super::command::{Run, baseline, build, render, run};
 use super::lifting::base_colors;
 use super::sample::{files_below, json, write_source};
 
-/// The photo of the sample's room, rendered by the built-in tracer.
+/// The sample's room with its input view alone, rendered by the built-in tracer.
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("delighting");
     let recipe = write_source(&folder.join("source"), "resolution = [96, 72]\natlas_size = 64\nviews = []", &["room"]);

@@ -57,7 +57,7 @@ fn it_says_what_it_made_resumes_and_refuses_other_folders() {
     };
     let (make, score_and_rank) = commands.split_at(commands.find("  mateval eval score").unwrap());
     paste(make);
-    // With the truth's maps in place of its own, since scoring others traces paths for minutes.
+    // With the truth's maps in place of the baseline's, since scoring other maps traces paths for minutes.
     let [made, truth] = ["median-photo", "gt"].map(|name| out.join("submissions").join(name).join("scenes"));
     std::fs::remove_dir_all(&made).unwrap();
     copy_folder(&truth, &made);

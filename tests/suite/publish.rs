@@ -25,7 +25,7 @@ static SPLIT: LazyLock<PathBuf> = LazyLock::new(|| {
     copy_source(&folder.join("source"));
     std::fs::write(folder.join("key"), [3; 32]).unwrap();
     let recipe = folder.join("source/redressed.toml");
-    // A quarter of the pixels of others: scores on it trace paths.
+    // A quarter of the pixels of the other datasets, since scoring this one traces paths.
     let head = SMALL.replace("[96, 72]", "[48, 36]");
     let text = recipe_text(&head, &["room"]) + "redress = { key = \"../key\" }\n";
     std::fs::write(&recipe, text).unwrap();

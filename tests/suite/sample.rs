@@ -23,7 +23,7 @@ static OWN_MATERIALS: LazyLock<PathBuf> = LazyLock::new(|| {
     dataset
 });
 
-/// What `mateval sample` writes.
+/// The source that `mateval sample` writes.
 static SOURCE: LazyLock<PathBuf> = LazyLock::new(|| {
     let source = kept_folder("source").join("source");
     run_words([Path::new("sample"), &source]).ends_with(0);

@@ -25,7 +25,7 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ViewSet {
-    /// The input view, and those that are it turned: they share their paths.
+    /// The input view and the turned ones, which share their paths. In captured rooms also the views of other photos.
     Turned,
     Wide,
 }

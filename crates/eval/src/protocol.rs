@@ -86,7 +86,7 @@ impl Protocol {
     pub const NAMES: [&str; 3] = ["mateval-3", "paper", CAPTURE];
 
     pub fn named(name: &str) -> Result<Self, EvalError> {
-        // Fitted light is near 22 dB: a few plain samples are enough.
+        // PSNR under fitted light is near 22 dB, so a few plain samples are enough.
         let fitted = || {
             let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
             light.samples.fix(16);
@@ -98,7 +98,7 @@ impl Protocol {
                 (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
             }
             "paper" => (MaskRule::BlackFill, AlbedoSpace::Srgb, fitted()),
-            // Nothing of a captured room is known but measured colours and photos.
+            // Of a captured room only measured colours and photos are known.
             CAPTURE => (MaskRule::Inside, AlbedoSpace::Linear, fitted()),
             _ => return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES }),
         };

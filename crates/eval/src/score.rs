@@ -619,7 +619,9 @@ fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> 
     if !scoring.is_empty() && !task.scene.source.kind.states_materials() {
         task.score_measured(&scores, &mut sheets)?;
         for &at in &scoring {
-            task.protocols[at].photos.as_ref().map_or(Ok(()), |rules| score_photos(task, rules, at, &mut sheets))?;
+            if let Some(rules) = &task.protocols[at].photos {
+                score_photos(task, rules, at, &mut sheets)?;
+            }
         }
     } else if !scoring.is_empty() {
         for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {

@@ -1,4 +1,4 @@
-//! Photos of a real room beside renders of its scan: the pixels that can be compared, and the exposure of a photo.
+//! Comparing photos of a real room with renders of its scan: the pixels that can be compared, and the exposure of a photo.
 //!
 //! A clipped pixel states only the least radiance. Beside an edge of depth, a scan that is off by a pixel shows another
 //! surface than the photo does.
@@ -21,24 +21,24 @@ pub struct PhotoRules {
 }
 
 impl Default for PhotoRules {
-    /// Byte 254 of sRGB: cameras' JPEGs seldom reach 255 where they clip.
+    /// `clipped_from` is byte 254 of sRGB: JPEGs of cameras seldom reach 255 where they clip.
     fn default() -> Self {
         Self { clipped_from: 0.991, depth_jump: 0.05, jump_pixels: 2 }
     }
 }
 
 impl PhotoRules {
-    /// Those of the `valid` pixels that count. `photo` is linear, before exposure; `depth` is 0 where nothing is seen.
+    /// The `valid` pixels that count. `photo` is linear, before exposure; `depth` is 0 where nothing is seen.
     pub fn counted(&self, photo: &Picture<LinearRgb>, exposure: f64, depth: &Picture<f32>, valid: &Mask) -> Mask {
         let jumps = self.jumps(depth);
-        // A jump lies between the pixels that it marks.
+        // `jumps` already marks the first pixel on either side of a jump.
         let reach = self.jump_pixels.saturating_sub(1) as usize;
         let (width, height) = (depth.width(), depth.height());
         let near = |at: usize, size: usize| at.saturating_sub(reach)..(at + reach + 1).min(size);
         Mask::from_fn(width, height, |x, y| {
             let is_clipped = || photo.get(x, y).0.iter().any(|v| f64::from(*v) * exposure >= self.clipped_from);
-            let jumps = || near(y, height).any(|y| near(x, width).any(|x| jumps.get(x, y)));
-            valid.get(x, y) && !is_clipped() && !jumps()
+            let is_beside_jump = || near(y, height).any(|y| near(x, width).any(|x| jumps.get(x, y)));
+            valid.get(x, y) && !is_clipped() && !is_beside_jump()
         })
     }
 
@@ -56,8 +56,8 @@ impl PhotoRules {
 }
 
 /// The factor with which a render, as the mean of two independent `halves`, has the least squared difference from the
-/// photo, over all channels of the pixels that count; 1 where they are black. The square of the render is taken as the
-/// product of its halves, whose noise has no share in it.
+/// photo, over all channels of the pixels that count; 1 if photo or render is black there. The square of the render is
+/// taken as the product of its halves: their noise is independent, so it does not enlarge the square on average.
 pub fn exposure_factor(halves: [&Picture<LinearRgb>; 2], photo: &Picture<LinearRgb>, counted: &Mask) -> f64 {
     let (mut of_photo, mut of_render) = (0.0, 0.0);
     for at in (0..counted.pixels().len()).filter(|at| counted.pixels()[*at]) {
@@ -108,7 +108,7 @@ mod tests {
         assert_eq!(RULES.counted(&photo, 1.0, &Picture::filled(12, 8, 2.0), &valid), valid);
     }
 
-    /// A photo of three times the render's light; noise that both halves do not share moves nothing.
+    /// A photo of three times the render's light. Noise that is independent between the halves does not move the mean.
     #[test]
     fn an_exposure_is_found_under_noise() {
         let render = Picture::from_fn(12, 8, |x, y| LinearRgb([x as f32, y as f32, 2.0]));

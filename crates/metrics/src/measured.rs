@@ -45,7 +45,8 @@ pub fn color_difference(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// CIEDE2000 of two colours of CIE Lab (Sharma, Wu and Dalal 2005, "The CIEDE2000 color-difference formula", equations 2
-/// to 22, with all parametric factors 1). `palette`'s, by which albedo pictures are compared, has rounded constants.
+/// to 22, with all parametric factors 1). The one of `palette`, with which albedo pictures are compared, has rounded
+/// constants.
 fn ciede2000([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
     let seventh = |chroma: f64| {
         let power = libm::pow(chroma, 7.0);
@@ -251,7 +252,7 @@ mod tests {
         }
     }
 
-    /// Pairs of the paper's own data (its table 1), whose hues lie on either side of what the formula decides by.
+    /// Pairs of table 1 of the paper, chosen so that each case of the formula's mean hue and hue difference occurs.
     #[test]
     fn ciede2000_has_the_values_of_its_paper() {
         let pairs = [

@@ -120,8 +120,7 @@ pub struct SourceScene {
     pub captured: Option<CapturedPhoto>,
     /// The photos of other views of a captured room, relative to the source's folder, and their cameras.
     pub novel: Vec<(String, CapturedCamera)>,
-    /// The poses that the input camera of a captured room has by other conventions, each with what is done to the stated
-    /// pose.
+    /// The poses of a captured room's input camera by other conventions, each with the change to the stated pose in words.
     pub other_poses: Vec<(&'static str, CapturedCamera)>,
 }
 

@@ -201,11 +201,13 @@ pub struct SceneFile {
     /// Multiplies every RGB picture before clipping.
     pub exposure: f64,
     /// The file of the input picture, where that came from elsewhere; absent where it is rendered. The light of such a
-    /// picture is not known, so the scene has no renders and its light is not scored.
+    /// picture is not known, so the scene has no renders, and its light is scored in captured rooms only, under lights
+    /// that are fitted to the photo.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo: Option<Photo>,
     /// By view, the other photos of a captured room, with which renders are compared:
-    /// `ground_truth/views/<view>/photo.exr`. Their exposure is theirs alone. Absent where there are none.
+    /// `ground_truth/views/<view>/photo.exr`. Each has an exposure of its own, which is not known.
+    /// Absent where there are none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub novel_photos: BTreeMap<ViewId, Photo>,
     /// What is public of the truth, where materials were replaced by others that were drawn with a secret key; absent

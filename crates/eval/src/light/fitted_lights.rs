@@ -6,8 +6,8 @@
 //! the render, so that the noise of the fit adds no bias to the squared error; the difference of the errors under
 //! either fit shows its noise. The truth is another renderer's picture, so nothing travels along and nothing is exact.
 //!
-//! Photos of a captured room are compared in the same way. Light is fitted to the input photo alone; every other photo
-//! has an exposure of its own, by which renders are multiplied.
+//! Photos of a captured room are compared in the same way. Light is fitted to the input photo alone. Every other photo
+//! has an unknown exposure of its own: renders are multiplied by the factor that fits them to it best.
 
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::{Camera, RendererId, SceneLights};
@@ -15,6 +15,7 @@ use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, exr_io};
 use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
 use mateval_light::light_stage;
 use mateval_light::photo_pixels::{PhotoRules, exposure_factor};
+use mateval_metrics::alignment::scaled;
 use mateval_tracer::{LightBasis, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
 use rayon::prelude::*;
 
@@ -29,25 +30,32 @@ use crate::truth::{ViewTruth, photo_of_renderer, sized};
 
 /// What renders under fitted lights are compared with, by view.
 pub(crate) struct Photos {
-    /// Linear, before exposure.
+    /// Linear radiance before exposure.
     pictures: Vec<Picture<LinearRgb>>,
-    /// Of a photo whose exposure is free, the pixels by which it is found.
+    /// The pixels that determine the exposure of a photo; none if that is the scene's own.
     free: Vec<Option<Mask>>,
+    /// The fit takes a channel that is at least this, exposed, as clipped.
+    clipped_from: f64,
 }
 
 impl Photos {
     pub(crate) fn of_renderer(task: &SceneTask<'_>, renderer: &RendererId) -> Result<Self, EvalError> {
         let pictures = task.views.iter().map(|view| photo_of_renderer(task.folder, renderer, view));
-        Ok(Self { pictures: pictures.collect::<Result<_, _>>()?, free: vec![None; task.views.len()] })
+        Ok(Self {
+            pictures: pictures.collect::<Result<_, _>>()?,
+            free: vec![None; task.views.len()],
+            clipped_from: 1.0,
+        })
     }
 
-    /// The photos of a captured scene, and the pixels of each that count.
+    /// The photos of a captured scene, and for each photo the pixels that count.
     pub(crate) fn of_capture(
         task: &SceneTask<'_>,
         truths: &[ViewTruth],
         rules: &PhotoRules,
     ) -> Result<(Self, Vec<Mask>), EvalError> {
-        let (mut photos, mut all_counted) = (Self { pictures: Vec::new(), free: Vec::new() }, Vec::new());
+        let mut photos = Self { pictures: Vec::new(), free: Vec::new(), clipped_from: rules.clipped_from.min(1.0) };
+        let mut all_counted = Vec::new();
         for (view, truth) in task.views.iter().zip(truths) {
             let shown = task.folder.view(&view.id);
             let is_input = view.id.as_str() == INPUT;
@@ -73,9 +81,9 @@ pub(crate) fn compare_under_fitted_lights(
     each: &mut LitSink<'_>,
 ) -> Result<(), EvalError> {
     let lit = FittedLights::new(task, protocol)?;
-    let exposed = |picture: &Picture<LinearRgb>| times(picture, task.scene.exposure);
-    let Photos { pictures: photos, free } = photos;
-    let references: Vec<ColorPicture> = photos.iter().map(|photo| ColorPicture::new(exposed(photo))).collect();
+    let exposed = |picture: &Picture<LinearRgb>| scaled(picture, [task.scene.exposure; 3]);
+    let free = &photos.free;
+    let references: Vec<ColorPicture> = photos.pictures.iter().map(|photo| ColorPicture::new(exposed(photo))).collect();
     let paths = lit.paths(task, protocol);
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
     let pixels = task.pixels().next().unwrap_or(0);
@@ -112,11 +120,8 @@ pub(crate) fn compare_under_fitted_lights(
     Ok(())
 }
 
-fn times(picture: &Picture<LinearRgb>, factor: f64) -> Picture<LinearRgb> {
-    picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * factor) as f32)))
-}
-
-/// The encoded difference of each half from the photo, without any correction but for a `free` exposure.
+/// The encoded difference of each half from the photo. The only correction is the exposure of photos whose exposure is
+/// `free`.
 fn plain_differences(
     views: &[[&Picture<LinearRgb>; 4]],
     guides: &ViewGuides<'_>,
@@ -135,7 +140,7 @@ fn plain_differences(
             let halves = |[a1, a2, b1, b2]: [&Picture<LinearRgb>; 4]| [mean_of(a1, a2), mean_of(b1, b2)];
             let multiplied = free[view].as_ref().map(|counted| {
                 let factor = exposure_factor(halves(*quarters).each_ref(), guide.reference, counted);
-                quarters.map(|quarter| times(quarter, factor))
+                quarters.map(|quarter| scaled(quarter, [factor; 3]))
             });
             let quarters = multiplied.as_ref().map_or(*quarters, |multiplied| multiplied.each_ref());
             let ([a1, a2, b1, b2], means) = (quarters, halves(quarters));
@@ -189,7 +194,7 @@ impl FittedLights {
         repaint: &Repaint,
         task: &SceneTask<'_>,
         truths: &[ViewTruth],
-        photos: &[Picture<LinearRgb>],
+        photos: &Photos,
     ) -> Result<Vec<Fit>, EvalError> {
         let input = task.input_view()?;
         let place = task.views.iter().position(|view| view.id == input.id);
@@ -201,8 +206,8 @@ impl FittedLights {
             Ok(renders.into_iter().map(|mut render| render.views.remove(0).halves.remove(0)).collect())
         };
         let (first, second) = (bases("fit_a")?, bases("fit_b")?);
-        let target =
-            FitTarget { photo: &photos[place], mask: Some(&truths[place].valid), exposure: task.scene.exposure };
+        let exposure = task.scene.exposure / photos.clipped_from;
+        let target = FitTarget { photo: &photos.pictures[place], mask: Some(&truths[place].valid), exposure };
         let fits = first.iter().zip(&second).map(|(first, second)| {
             let fit = fit_two_streams(&paths.rules.fit, [first, second], &target)?;
             let radiances = fit.radiances(&self.names, self.is_stage);

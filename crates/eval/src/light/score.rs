@@ -56,8 +56,8 @@ pub(crate) fn compare_under_lights(
     Ok(())
 }
 
-/// Compares every submission with the photos of a captured scene under lights that are fitted to the input photo, by
-/// protocol number `at`.
+/// Scores every submission against the photos of a captured scene, by protocol number `at`. Its lights are fitted to the
+/// input photo.
 pub(crate) fn score_photos(
     task: &SceneTask<'_>,
     rules: &PhotoRules,
@@ -73,7 +73,7 @@ pub(crate) fn score_photos(
         ViewTruth { valid: counted.clone(), unobserved: truth.unobserved.as_ref().map(both), ..truth.clone() }
     };
     let narrowed: Vec<ViewTruth> = truths.iter().zip(&counted).map(narrowed).collect();
-    // True base colours are not known: every ratio is 1.
+    // True base colours are not known. Black on both sides makes every ratio 1.
     let black = |truth: &ViewTruth| Picture::filled(truth.valid.width(), truth.valid.height(), LinearRgb([0.0; 3]));
     let truth: Vec<_> = truths.iter().map(black).collect();
     let base_colors = BaseColors { predicted: vec![truth.clone(); task.predictions.len()], truth };

@@ -28,8 +28,8 @@ type Values = [f32; 5];
 
 /// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a
 /// predicted material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's
-/// pictures: whether a few of them or all are looked at is decided by the world's own materials, for all submissions
-/// alike, unless they are placeholders, which decide nothing (`all_places`). Rays are traced once for all.
+/// pictures: the world's own materials decide, for all submissions alike, whether a few of them are looked at or all.
+/// Placeholders cannot decide this; with `all_places` all are looked at. Rays are traced once for all submissions.
 ///
 /// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces.
 pub fn material_pictures(

@@ -45,7 +45,7 @@ const FORMATS: [(&str, &str); 6] = [
 const SCENE: &str = "living";
 /// The distortion of the photo in the folder `distorted`.
 const K1: f64 = -0.2;
-/// By what the photo of each view is brighter than the ordinary one.
+/// The brightness of each view's photo relative to the ordinary one.
 const FACTORS: [f64; 5] = [1.0, 1.0, 1.0, 0.5, 0.7];
 
 fn ordinary() -> (&'static Dataset, &'static SceneFile) {
@@ -86,7 +86,7 @@ fn words(rgb: [f32; 3]) -> [u16; 3] {
     rgb.map(|v| word_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
 }
 
-/// A photo before the input photo, so that the latter's number is 1, and those of all views, the input photo first.
+/// A photo that no view shows, so that the input photo's number is 1, then the photos of all views, the input photo first.
 fn write_photos(folder: &Path, photos: impl Iterator<Item = Picture<[u16; 3]>>) {
     std::fs::create_dir_all(folder).unwrap();
     for (photo, number) in photos.zip(1..) {
@@ -145,7 +145,7 @@ fn write_mesh(path: &Path) {
     std::fs::write(path, head + &vertices + &faces).unwrap();
 }
 
-/// The cameras of all views from the second on, in all formats; the first looks the other way.
+/// In all formats, a camera that looks the other way, then the cameras of all views.
 fn write_cameras(folder: &Path) {
     let camera = input_view().camera;
     let back = Camera::from_rotation(
@@ -426,7 +426,7 @@ fn measured_colours_are_compared_with_means_of_the_albedo_picture() {
     let masks: BTreeMap<String, Mask> = regions().into_iter().map(|(index, mask)| (index.to_string(), mask)).collect();
     for region in measured.iter().filter(|region| region.scene.as_str() != "maw") {
         let expected = mean(&albedo, &masks[&region.region]);
-        // Of a capture a pixel is always a mean over 64 places. The mask of the distorted photo is drawn in its pixels.
+        // A pixel of a capture is always a mean over 64 places. The mask of the distorted photo is drawn in its pixels.
         let slack = if region.scene.as_str() == "distorted" { 0.04 } else { 1e-3 };
         let off = (0..3).map(|c| (region.predicted[c] - expected[c]).abs()).fold(0.0, f64::max);
         assert!(off < slack, "{} {}: {:?} {expected:?}", region.scene, region.region, region.predicted);
@@ -461,7 +461,7 @@ fn baselines_run_on_captures_and_the_truth_is_refused() {
     assert!(by_estimate.unwrap_err().to_string().contains("is captured"));
 }
 
-/// Scenes with the photos of all views: as the ordinary scene, whose seeds it has, and distorted.
+/// Scenes with the photos of all views: one with the id of the ordinary scene, and so with its seeds, and a distorted one.
 static WITH_NOVEL: LazyLock<Dataset> = LazyLock::new(|| {
     let novel: Vec<String> = (2..=FACTORS.len()).map(|number| format!("image_{number:04}")).collect();
     let building = ordinary().1.instances.iter().filter(|instance| instance.role.is_architecture());
@@ -494,7 +494,7 @@ fn photos_are_compared_as_in_the_paper() {
     let off = |scene: &str, view: usize| fitted(captured(&result), scene)[view] - expected[view];
     // Undistorting blurs the photo twice.
     assert!(off(SCENE, 0).abs() < 0.1 && off("distorted", 0).abs() < 0.3, "{} {}", off(SCENE, 0), off("distorted", 0));
-    // An exposure of its own takes away an error of brightness, and nothing else; darker photos have smaller errors.
+    // A free exposure removes an error of brightness and nothing else. Darker photos have smaller errors.
     for (view, factor) in FACTORS.iter().enumerate().skip(1) {
         let range = if *factor < 1.0 { 0.5..4.0 } else { -0.1..0.8 };
         assert!(range.contains(&off(SCENE, view)), "{view}: {}", off(SCENE, view));
@@ -503,7 +503,7 @@ fn photos_are_compared_as_in_the_paper() {
     let result = scored(&WITH_NOVEL, &of_captures, "capture-1");
     let lit = captured(&result).pictures.iter().filter(|picture| picture.picture.kind.is_light());
     let shares: Vec<f64> = lit.map(|picture| picture.left_out.unwrap()).collect();
-    // Of each scene the input view, and the other views with and without what the input view sees.
+    // Per scene the valid pixels of each view, and of each view but the input view also the unobserved ones.
     assert_eq!(shares.len(), 2 * (2 * FACTORS.len() - 1));
     assert!(shares.iter().all(|share| (0.1..0.8).contains(share)), "{shares:?}");
     let key = "rgb_fitted.novel.psnr".parse().unwrap();
@@ -604,7 +604,7 @@ fn captures_that_cannot_be_scored_are_refused_with_the_reason() {
     );
 }
 
-/// Writes `transforms.json` with other poses.
+/// Writes a copy of `transforms.json` whose poses are changed by `pose`.
 fn write_posed(file: &str, pose: impl Fn(Camera) -> Camera) {
     let mut transforms: serde_json::Value = json::read(&SOURCE.join("transforms.json")).unwrap();
     let cameras = ordinary().1.views.iter().map(|view| view.camera);
@@ -614,7 +614,7 @@ fn write_posed(file: &str, pose: impl Fn(Camera) -> Camera) {
     std::fs::write(SOURCE.join(file), transforms.to_string()).unwrap();
 }
 
-/// Poses of another convention are recognised by the edges of the photo; those that are right give no warning.
+/// Poses of another convention are recognised by the edges of the photo. Correct poses give no warning.
 #[test]
 fn poses_of_another_convention_are_named() {
     let half = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
@@ -639,8 +639,8 @@ fn poses_of_another_convention_are_named() {
     assert!(said("inverted.json")[0].contains("with the matrix inverted,"));
 }
 
-/// The undistorted picture of a pincushion does not hold the middle of the photo's left edge: its region is left out, or
-/// alone refused.
+/// The undistorted picture of a pincushion does not hold the middle of the photo's left edge. A region there is left out,
+/// and refused if it is the only one.
 #[test]
 fn regions_outside_of_the_picture_are_left_out() {
     let transforms = std::fs::read_to_string(SOURCE.join("distorted.json")).unwrap();

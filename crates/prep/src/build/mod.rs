@@ -3,7 +3,8 @@
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
 //! reads the source and chooses the input camera, and `redress` gives it other materials if the recipe says so; `plan`
 //! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one and the colours that were
-//! `measured` in it, compares its `poses` with it, converts the materials and places the views (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
+//! `measured` in it, checks the input camera against the photo (`poses`), converts the materials and places the views
+//! (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
 //! become a wrong truth; [`materials`] unwraps every instance and bakes its material ([`baking`]); meshes and
 //! `scene.json` are written here. [`finish`] makes the `twins` of rendered scenes
 //! and writes the files of the whole dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a

@@ -1,5 +1,5 @@
-//! A photo from elsewhere, which takes the place of a rendered picture: its file, size and exposure. Other photos of a
-//! captured room than the input photo belong to its truth.
+//! A photo from elsewhere, which takes the place of a rendered picture: its file, size and exposure. The photos of a
+//! captured room belong to its truth, except the input photo.
 
 use std::path::Path;
 
@@ -18,7 +18,6 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_sources::source_scene::{CapturedPhoto, SourceScene};
 
 use super::fault::{BuildFault, PhotoFault};
-use super::source::placed_view;
 use crate::error::PrepError;
 use crate::recipe::RecipeScene;
 use crate::views::write_preview;
@@ -66,24 +65,24 @@ pub(super) fn read_photo(
     Ok(Some(photo))
 }
 
-/// Reads the other photos of a captured room as pictures of their views, `novel_1` and so on, at the size of the input
-/// view's, and lists their files among the source's. `root` is the folder of the recipe's paths.
+/// Reads the other photos of a captured room at the size of the input view, with their cameras, and lists their files
+/// among the source's. `root` is the folder of the recipe's paths.
 pub(super) fn read_novel_photos(
     entry: &RecipeScene,
     root: &Path,
     scene: &mut SourceScene,
-) -> Result<Vec<(View, ScenePhoto)>, PrepError> {
+) -> Result<Vec<(Camera, ScenePhoto)>, PrepError> {
     let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
     let Intrinsics { width, height, .. } = scene.camera.intrinsics;
     let mut all = Vec::new();
-    for ((path, camera), number) in std::mem::take(&mut scene.novel).into_iter().zip(1..) {
+    for (path, camera) in std::mem::take(&mut scene.novel) {
         let (captured, file) = read_captured(root, &path, camera.lens).map_err(fault)?;
         scene.read.files.extend(file);
         let intrinsics = pinhole(&captured, [width, height]).map_err(fault)?;
         let camera = Camera::from_rotation(camera.rotation, camera.position, intrinsics);
         let photo = captured_photo(&captured, &camera, entry.exposure).map_err(fault)?;
         scene.read.findings.extend(photo.transparency());
-        all.push((placed_view(&format!("novel_{number}"), camera), photo));
+        all.push((camera, photo));
     }
     scene.read.files.hashes.dedup();
     scene.read.findings.sort();
@@ -196,7 +195,7 @@ impl ScenePhoto {
             .then(|| Finding::new(Severity::Warning, "transparent_photo", file, "", message, action))
     }
 
-    /// Writes `photo.exr` of another view than the input view, among the ground truth.
+    /// Writes `photo.exr` of a view other than the input view into the ground truth.
     pub(super) fn write_truth(&self, folder: &SceneFolder, view: &ViewId) -> Result<(), PrepError> {
         Ok(exr_io::write_linear(&folder.novel_photo(view), &self.picture, Precision::Float)?)
     }

@@ -20,7 +20,7 @@ use super::measured::{SceneRegions, read_regions};
 use super::parts::{InstanceEntry, PartEntry, PartSplit, list_instances};
 use super::photo::{ScenePhoto, read_novel_photos, read_photo};
 use super::poses::other_convention;
-use super::source::views_of;
+use super::source::{placed_view, views_of};
 use super::wide_views::wide_views;
 use crate::conversion::convert;
 use crate::error::PrepError;
@@ -86,11 +86,15 @@ pub(super) fn make_plan(
     let novel = read_novel_photos(entry, source, &mut source_scene)?;
     let mut views = views_of(recipe, source_scene.camera);
     if source_scene.captured.is_some() {
-        // No score could compare with views that nobody took a photo of.
+        // Turned views have no photo, so no score could compare with them.
         views.truncate(1);
-        views.extend(novel.iter().map(|(view, _)| view.clone()));
     }
-    let novel_photos = novel.into_iter().map(|(view, photo)| (view.id, photo)).collect();
+    let mut novel_photos = BTreeMap::new();
+    for ((camera, photo), number) in novel.into_iter().zip(1..) {
+        let view = placed_view(&format!("novel_{number}"), camera);
+        novel_photos.insert(view.id.clone(), photo);
+        views.push(view);
+    }
     let measured = read_regions(entry, source, &mut source_scene, &views[0])?;
     let SourceScene { kind, states_roughness, states_metallic, house, file, read, camera, captured, .. } = source_scene;
     let mut findings = read.findings;
@@ -103,6 +107,7 @@ pub(super) fn make_plan(
         }
     };
     let scene = Arc::new(scene);
+    // A pose of the wrong convention would score every method against the wrong pixels.
     if let (Some(room), Some(photo)) = (&entry.capture, &photo) {
         let others = source_scene
             .other_poses

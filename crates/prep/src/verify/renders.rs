@@ -82,7 +82,7 @@ pub(super) fn check_renders(folder: &SceneFolder, scene: &SceneFile, renderer: &
 }
 
 /// Reports photos whose file the source does not list, renders that should not exist, and pictures of photos that are
-/// missing, unreadable or of another size than the camera's. Those of novel views are checked if the ground truth exists.
+/// missing, unreadable or of another size than the camera's. Photos of novel views are checked if the ground truth exists.
 pub(super) fn check_photos(folder: &SceneFolder, scene: &SceneFile, photo: &Photo, faults: &mut Faults) {
     if folder.truth().join("renders").exists() {
         faults.add("unexpected_renders", "ground_truth/renders", "", "expected none, since the scene has a photo");

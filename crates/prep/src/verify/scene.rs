@@ -15,7 +15,7 @@ use mateval_dataset::material::{ColorInput, Material, MaterialModel};
 use mateval_dataset::measured::{MeasuredFile, color_fault};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_dataset::submission::Map;
-use mateval_dataset::{Camera, DatasetError, ViewId, json};
+use mateval_dataset::{Camera, DatasetError, SourceKind, ViewId, json};
 use mateval_image::Wrap;
 use mateval_image::png_io;
 use mateval_image::texture_io::{Encoding, read_texture};
@@ -84,13 +84,17 @@ fn check_views(scene: &SceneFile, faults: &mut Faults) {
                 "expected focal lengths and a size above 0, and a finite principal point",
             );
         }
-        // Where a photo was taken, and with which lens, is its own.
+        // A novel photo has a place and a lens of its own.
         if !scene.novel_photos.contains_key(&view.id) {
             check_place(view, &input.camera, at, faults);
         }
     }
-    for view in scene.novel_photos.keys().filter(|id| scene.view(id.as_str()).is_none()) {
-        let message = format!("the scene has no view '{view}'");
+    if !scene.novel_photos.is_empty() && (scene.source.kind != SourceKind::Capture || scene.photo.is_none()) {
+        let message = "expected none, since only a captured room with an input photo has others";
+        faults.add("unexpected_photo", SCENE_FILE, "/novel_photos", message);
+    }
+    for view in scene.novel_photos.keys().filter(|id| scene.view(id.as_str()).is_none() || id.as_str() == INPUT) {
+        let message = format!("the scene has no novel view '{view}'");
         faults.add("dangling_reference", SCENE_FILE, format!("/novel_photos/{view}"), message);
     }
 }

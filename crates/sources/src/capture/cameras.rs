@@ -32,8 +32,8 @@ pub struct CapturedCamera {
 }
 
 impl CapturedCamera {
-    /// The poses that the camera has if the file follows another convention than it should, or if the mesh was turned and
-    /// the cameras were not, each with what was done to the stated pose.
+    /// The poses of the camera if the file follows another convention than the one of its format, or if the mesh was turned
+    /// and the cameras were not. Each comes with the change to the stated pose in words.
     pub fn other_poses(&self) -> impl Iterator<Item = (&'static str, Self)> {
         let posed = |rotation: DMat3, position: DVec3| Self { rotation, position, ..self.clone() };
         let half = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));

@@ -65,7 +65,7 @@ pub struct CaptureFiles {
     pub photos: String,
     /// The input photo: its name, with or without its ending.
     pub input: String,
-    /// The photos of other views, named alike.
+    /// The photos of other views: their names, with or without their endings.
     pub novel: Vec<String>,
     /// A NumPy file with an integer for each triangle of the mesh, the number of its instance.
     pub labels: Option<String>,
@@ -108,7 +108,7 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
         (relative(&files.mesh)?, relative(&files.cameras)?, relative(&files.photos)?);
     let mut log = Log::new(mesh.clone(), MOST_FINDINGS);
 
-    // The cameras, and of them those of the named photos.
+    // The cameras, and among them those of the named photos.
     let in_cameras = |fault: Invalid| fault.in_file(&root.join(&camera_path));
     let cameras = read_cameras(&mut folder, &camera_path).map_err(in_cameras)?;
     if cameras.is_transformed {
