@@ -15,8 +15,8 @@ use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 use mateval_testkit::{copy_folder, kept_folder};
 use serde_json::Value;
 
-use super::command::{baseline, build, mateval, run, run_words};
-use super::sample::{files_below, json};
+use super::command::{baseline, build, mateval, run};
+use super::sample::{copy_source, files_below, json};
 
 /// A room as its source shows it (`undressed`), redressed (`redressed`), and the public part of that (`public`), each with a
 /// photo; and the first two without one (`undressed_scored`, `redressed_scored`), since nothing is rendered where these are
@@ -85,7 +85,7 @@ fn score(submission: &Path, dataset: &Path, result: &Path) -> Command {
 
 static SAMPLE: LazyLock<Rooms> = LazyLock::new(|| {
     let source = kept_folder("attacked_source").join("source");
-    run_words([Path::new("sample"), &source]).ends_with(0);
+    copy_source(&source);
     Rooms::new("attacked", &source, "bitterli = \"room/scene.xml\"")
 });
 
