@@ -155,12 +155,14 @@ enum Place {
 
 impl Place {
     fn of(out: &Path) -> Self {
+        // A build that was killed before it wrote its key has written nothing else. Asked before the key is, since
+        // another build may begin meanwhile, and writes its scenes after its key.
+        let is_new = !out.exists() || holds_only(out, &[BUILD]);
         if is_build(out) {
             Self::Build
         } else if out.join(DATASET).is_file() {
             Self::Dataset
-        } else if !out.exists() || holds_only(out, &[BUILD]) {
-            // A build that was killed before it wrote its key has written nothing else.
+        } else if is_new {
             Self::New
         } else {
             Self::Other
