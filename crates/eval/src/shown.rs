@@ -14,7 +14,7 @@ use mateval_submission::prediction::{PredictedScene, read_scene};
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::compare_under_lights;
-use crate::materials::pictures::material_pictures;
+use crate::materials::pictures::{Places, material_pictures};
 use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::protocol::{Protocol, Track};
 use crate::scene::SceneTask;
@@ -38,7 +38,7 @@ pub fn scene_albedo(
     let predictions = predictions_of(submissions, scene, &atlases)?;
     let view = |view: &View| {
         let predictions: Vec<_> = predictions.iter().collect();
-        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions, false);
+        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions, Places::AsTruth);
         let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
         Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
     };

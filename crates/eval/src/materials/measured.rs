@@ -12,7 +12,7 @@ use mateval_metrics::measured::{RegionColors, color_difference, maw_mask, maw_pi
 use mateval_submission::prediction::PredictedScene;
 
 use crate::error::EvalError;
-use crate::materials::pictures::material_pictures;
+use crate::materials::pictures::{Places, material_pictures};
 use crate::metric::{Measure, Metric, PictureKind};
 use crate::result::key::{PictureName, Region};
 use crate::result::{MeasuredValues, PictureValues};
@@ -85,7 +85,7 @@ impl SceneTask<'_> {
         for view in &self.views {
             let Some(regions) = measured.pictures.get(&view.id) else { continue };
             let small = maw_mask(regions);
-            let pictures = material_pictures(self.world, self.atlases, &view.camera, &predictions, true);
+            let pictures = material_pictures(self.world, self.atlases, &view.camera, &predictions, Places::All);
             for (sheets, pictures) in sheets.iter_mut().zip(pictures) {
                 let of_view = || measured.regions.iter().filter(|region| region.view == view.id);
                 let whole = sums(regions, &pictures.base_color, |LinearRgb(rgb)| rgb.map(f64::from));

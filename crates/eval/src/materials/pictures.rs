@@ -23,13 +23,21 @@ pub struct MaterialPictures {
     pub metallic: Picture<f32>,
 }
 
+/// Which of a pixel's sub-pixels are looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Places {
+    /// Those of the truth's pictures: the world's own materials decide whether a few suffice.
+    AsTruth,
+    /// All, since the world's materials are placeholders, which decide nothing.
+    All,
+}
+
 /// Red, green and blue of the base colour, roughness, metallic.
 type Values = [f32; 5];
 
 /// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a
-/// predicted material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's
-/// pictures: the world's own materials decide, for all submissions alike, whether a few of them are looked at or all.
-/// Placeholders cannot decide this; with `all_places` all are looked at. Rays are traced once for all submissions.
+/// predicted material, and 0 if there are none (such pixels are not valid). The same are looked at for all submissions,
+/// and rays are traced once.
 ///
 /// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces.
 pub fn material_pictures(
@@ -37,11 +45,11 @@ pub fn material_pictures(
     atlases: &[TriangleMesh],
     camera: &Camera,
     submissions: &[&PredictedScene],
-    all_places: bool,
+    wanted: Places,
 ) -> Vec<MaterialPictures> {
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
     let rows: Vec<Vec<Vec<Values>>> =
-        (0..height).into_par_iter().map(|y| picture_row(world, atlases, camera, submissions, all_places, y)).collect();
+        (0..height).into_par_iter().map(|y| picture_row(world, atlases, camera, submissions, wanted, y)).collect();
     (0..submissions.len())
         .map(|index| {
             let pixels = rows.iter().flat_map(|row| row[index].iter().copied()).collect();
@@ -60,7 +68,7 @@ fn picture_row(
     atlases: &[TriangleMesh],
     camera: &Camera,
     submissions: &[&PredictedScene],
-    all_places: bool,
+    wanted: Places,
     y: usize,
 ) -> Vec<Vec<Values>> {
     let width = camera.intrinsics.width as usize;
@@ -74,7 +82,10 @@ fn picture_row(
             let hit = hit(at)?;
             Some(flatness_values(&appearance(world, hit.surface, hit.triangle.0, hit.barycentrics)?))
         };
-        let looked = if all_places { SUBPIXELS } else { PixelMean::of(true_values).looked };
+        let looked = match wanted {
+            Places::AsTruth => PixelMean::of(true_values).looked,
+            Places::All => SUBPIXELS,
+        };
         let places: Vec<Lookup> = (0..looked).filter_map(|at| Lookup::of(&hit(at)?, atlases)).collect();
         for (row, submission) in rows.iter_mut().zip(submissions) {
             row.push(mean_of(places.iter().filter_map(|place| values(submission, *place))));

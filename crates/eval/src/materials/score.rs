@@ -10,7 +10,7 @@ use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::materials::pictures::{MaterialPictures, material_pictures};
+use crate::materials::pictures::{MaterialPictures, Places, material_pictures};
 use crate::materials::texels::texture_space;
 use crate::metric::{ColorPicture, EncodedPair, HALF_A_BYTE, Measure, Metric, PictureKind, Stated};
 use crate::protocol::{AlbedoSpace, Protocol};
@@ -94,7 +94,7 @@ impl SceneTask<'_> {
         let all: Vec<&PredictedScene> = self.predictions.iter().chain([&true_maps]).collect();
         for (at, view) in self.views.iter().enumerate() {
             (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
-            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all, false);
+            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all, Places::AsTruth);
             let truth = pictures.pop().expect("the truth comes last").base_color;
             each(view, at, &pictures, &truth)?;
             base_colors.truth.push(truth);

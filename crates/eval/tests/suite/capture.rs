@@ -89,10 +89,12 @@ fn words(rgb: [f32; 3]) -> [u16; 3] {
 /// A photo that no view shows, so that the input photo's number is 1, then the photos of all views, the input photo first.
 fn write_photos(folder: &Path, photos: impl Iterator<Item = Picture<[u16; 3]>>) {
     std::fs::create_dir_all(folder).unwrap();
-    for (photo, number) in photos.zip(1..) {
-        png_io::write_rgb_words(&folder.join("image_0000.png"), &photo.map(|_| [9; 3])).unwrap();
-        png_io::write_rgb_words(&folder.join(format!("image_{number:04}.png")), &photo).unwrap();
-    }
+    let write = |number: usize, photo: &Picture<[u16; 3]>| {
+        png_io::write_rgb_words(&folder.join(format!("image_{number:04}.png")), photo).unwrap();
+    };
+    let photos: Vec<_> = photos.collect();
+    write(0, &photos[0].map(|_| [9; 3]));
+    photos.iter().zip(1..).for_each(|(photo, number)| write(number, photo));
 }
 
 fn lens(k1: f64) -> Lens {
@@ -340,12 +342,16 @@ fn scored_by(dataset: &Dataset, submission: &Path, protocol: Protocol) -> Result
 }
 
 /// A submission with one colour for each instance, by the index of the ordinary scene's.
-fn write_painted(dataset: &Dataset, out: &Path, index: impl Fn(&SceneFile, usize) -> usize) {
-    let method = submission::Method::new("painted", "");
+fn write_one_colored(
+    dataset: &Dataset,
+    out: &Path,
+    index: impl Fn(&SceneFile, usize) -> usize,
+    color: impl Fn(usize) -> [f32; 3],
+) {
+    let method = submission::Method::new("one-colored", "");
     submission::write(dataset, out, false, &method, |scene, instance, folder| {
         let at = scene.instances.iter().position(|known| known.id == instance.id).unwrap();
-        let index = index(scene, at) as f32;
-        let color = [0.13 * index % 0.9, 0.29 * index % 0.8, 0.47 * index % 0.7].map(|v| v + 0.1);
+        let color = color(index(scene, at));
         let picture = Picture::filled(16, 16, color.map(|v| byte_from_unit(srgb_from_linear(v))));
         png_io::write_rgb_bytes(&folder.join("base_color.png"), &picture).unwrap();
         Ok(())
@@ -353,25 +359,20 @@ fn write_painted(dataset: &Dataset, out: &Path, index: impl Fn(&SceneFile, usize
     .unwrap();
 }
 
-/// A submission with one colour for each instance: the mean of its true base colour, by the index of the ordinary
-/// scene's.
-fn write_means(dataset: &Dataset, out: &Path, index: impl Fn(&SceneFile, usize) -> usize) {
-    let (ordinary_dataset, ordinary) = ordinary();
-    let method = submission::Method::new("means", "");
-    submission::write(dataset, out, false, &method, |scene, instance, folder| {
-        let at = scene.instances.iter().position(|known| known.id == instance.id).unwrap();
-        let known = &ordinary.instances[index(scene, at) - 1];
-        let color = known.atlas.as_ref().map_or([0.5; 3], |atlas| {
-            let folder = ordinary_dataset.folder(&ordinary.id);
-            let map = true_material(&folder, &known.id, atlas.size as usize).unwrap().base_color;
-            let texels = Picture::from_fn(map.width(), map.height(), |x, y| LinearRgb(map.texel(x, y)));
-            mean(&texels, &texels.map(|_| true)).map(|v| v as f32)
-        });
-        let picture = Picture::filled(16, 16, color.map(|v| byte_from_unit(srgb_from_linear(v))));
-        png_io::write_rgb_bytes(&folder.join("base_color.png"), &picture).unwrap();
-        Ok(())
+fn painted(index: usize) -> [f32; 3] {
+    let index = index as f32;
+    [0.13 * index % 0.9, 0.29 * index % 0.8, 0.47 * index % 0.7].map(|v| v + 0.1)
+}
+
+/// The mean of the true base colour.
+fn true_mean(index: usize) -> [f32; 3] {
+    let (dataset, scene) = ordinary();
+    let instance = &scene.instances[index - 1];
+    instance.atlas.as_ref().map_or([0.5; 3], |atlas| {
+        let map = true_material(&dataset.folder(&scene.id), &instance.id, atlas.size as usize).unwrap().base_color;
+        let texels = Picture::from_fn(map.width(), map.height(), |x, y| LinearRgb(map.texel(x, y)));
+        mean(&texels, &texels.map(|_| true)).map(|v| v as f32)
     })
-    .unwrap();
 }
 
 fn label(scene: &SceneFile, at: usize) -> usize {
@@ -416,8 +417,8 @@ fn measured_colours_are_compared_with_means_of_the_albedo_picture() {
     let (dataset, ordinary) = ordinary();
     let folder = kept_folder("capture_painted");
     let (of_ordinary, of_captures) = (folder.join("ordinary"), folder.join("captures"));
-    write_painted(dataset, &of_ordinary, |_, at| at + 1);
-    write_painted(&CAPTURES, &of_captures, label);
+    write_one_colored(dataset, &of_ordinary, |_, at| at + 1, painted);
+    write_one_colored(&CAPTURES, &of_captures, label, painted);
     let albedo = scene_albedo(dataset, ordinary, &[&of_ordinary]).unwrap().remove(0).predicted.remove(0);
     let result = scored(&CAPTURES, &of_captures, "capture-1");
     let measured = &captured(&result).measured;
@@ -483,8 +484,8 @@ fn fitted(scores: &ProtocolResult, scene: &str) -> Vec<f64> {
 fn photos_are_compared_as_in_the_paper() {
     let folder = kept_folder("capture_means");
     let (of_ordinary, of_captures) = (folder.join("ordinary"), folder.join("captures"));
-    write_means(ordinary().0, &of_ordinary, |_, at| at + 1);
-    write_means(&WITH_NOVEL, &of_captures, label);
+    write_one_colored(ordinary().0, &of_ordinary, |_, at| at + 1, true_mean);
+    write_one_colored(&WITH_NOVEL, &of_captures, label, true_mean);
     let paper = scored(ordinary().0, &of_ordinary, "paper");
     let expected = fitted(&paper.protocols["paper"], SCENE);
     // Every valid pixel counts, as in `paper`.
