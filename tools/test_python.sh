@@ -2,7 +2,7 @@
 # Builds the wheel of the Python package and tests it in fresh environments of those of Python 3.9, 3.11 and 3.13 that are
 # found. Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters; those that pyenv keeps are found
 # too. MATEVAL_PROFILE=dev builds with the tests' profile, which shares its libraries with tools/test.sh, and tests the
-# oldest and the newest of them alone: each takes six minutes.
+# oldest and the newest of those found alone, unless PYTHONS is given: each takes six minutes.
 # MATEVAL_WHEELS=FOLDER builds nothing: it tests the wheel for this processor in FOLDER, whose own command then makes the
 # dataset.
 set -eu
@@ -57,7 +57,7 @@ for name in ${PYTHONS:-python3.9 python3.11 python3.13}; do
     found="$found $python"
 done
 [ -n "$found" ] || { echo "none of these Pythons was found" >&2; exit 1; }
-if [ "${MATEVAL_PROFILE:-}" = dev ]; then
+if [ "${MATEVAL_PROFILE:-}" = dev ] && [ -z "${PYTHONS:-}" ]; then
     found=$(printf '%s\n' $found | sed -n '1p; 1!{$p}')
 fi
 tested=0

@@ -80,11 +80,13 @@ pub(crate) fn score_photos(
     let meter = LightMeter::new(&task, &narrowed, &task.protocols[at]);
     let mut each = |submission: usize, lit: LitViews| meter.measure(&lit, &mut sheets[submission][at]);
     compare_under_fitted_lights(&task, &photos, &truths, &base_colors, &task.protocols[at], &mut each)?;
-    let all: Vec<Vec<MaskedRegion>> = truths.iter().map(regions).collect();
+    let of_views: Vec<Vec<MaskedRegion>> = truths.iter().map(regions).collect();
     for values in sheets.iter_mut().flat_map(|sheets| &mut sheets[at].score.pictures) {
         let place = task.views.iter().position(|view| view.id == values.view && values.picture.kind.is_light());
         let region = place.and_then(|view| {
-            all[view].iter().find(|known| (known.region, known.surfaces) == (values.region, values.picture.surfaces))
+            of_views[view]
+                .iter()
+                .find(|known| (known.region, known.surfaces) == (values.region, values.picture.surfaces))
         });
         let all = region.map_or(0, |region| pixel_count(&region.mask));
         values.left_out = (all > 0).then(|| 1.0 - values.pixels as f64 / all as f64);
