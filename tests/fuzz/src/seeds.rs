@@ -62,6 +62,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     keep(&corpus, "npy", "labels", &numbers)?;
     maps(&corpus, work.path())?;
     archives(&corpus, work.path())?;
+    captures(&corpus, &numbers)?;
     geometry(&corpus, work.path(), &source)
 }
 
@@ -113,6 +114,49 @@ fn archives(corpus: &Path, work: &Path) -> Result<(), Box<dyn std::error::Error>
     let tar: Vec<u8> = files.iter().flat_map(|(name, bytes)| packed::tar_entry(name, b'0', bytes)).collect();
     let long = [packed::tar_entry("long", b'L', b"a/long/name"), packed::tar_entry("pax", b'x', b"15 path=a/name\n")];
     keep(corpus, "archive_tar_gz", "plain", &[long.concat(), tar].concat())?;
+    Ok(())
+}
+
+/// A triangle with a camera of every format, and the labels of a NumPy file or measured colours after it.
+fn captures(corpus: &Path, labels: &[u8]) -> std::io::Result<()> {
+    const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n3 0 1 2 5\n";
+    const OBJ: &str = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    const MEASURED: &str = r#"{"format":"mateval-measurements/1","regions":[{"name":"a","photo":"a.png","mask":"a.png",
+        "value":1,"color":[0.5,0.5,0.5],"standard_error":[0.1,0.1,0.1]}]}"#;
+    let transforms = r#"{"camera_model":"OPENCV","fl_x":9,"fl_y":9,"cx":4,"cy":3,"w":8,"h":6,"k1":-0.2,"applied_transform":
+        [[1,0,0,0],[0,1,0,0],[0,0,1,0]],"frames":[{"file_path":"photos/a.png","transform_matrix":
+        [[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]}"#;
+    let of = |numbers: &[u32], rest: &[f64]| -> Vec<u8> {
+        let words = numbers.iter().flat_map(|number| number.to_le_bytes());
+        words.chain(rest.iter().flat_map(|number| number.to_le_bytes())).collect()
+    };
+    // One camera: its number, its model, width and height as 64 bits, four parameters. One photo: number, pose, camera,
+    // name, no points.
+    let camera = of(&[1, 0, 1, 1, 8, 0, 6, 0], &[9.0, 9.0, 4.0, 3.0]);
+    let image = [of(&[1, 0, 1], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0]), of(&[1], &[]), b"a.png\0".to_vec(), of(&[0; 2], &[])];
+    let image = image.concat();
+    // A camera with rows of K, of its rotation, of its translation and of its size.
+    let lighting = b"9 0 4\n0 9 3\n0 0 1\n1 0 0\n0 1 0\n0 0 1\n0 0 3\n8 6 3\n";
+    let cameras: [(&[u8], &[u8]); 6] = [
+        (transforms.as_bytes(), b""),
+        (&camera, &image),
+        (b"1 SIMPLE_RADIAL 8 6 9 4 3 -0.1\n", b"1 1 0 0 0 0 0 3 1 a.png\n\n"),
+        (b"PK\x05\x06\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", b""),
+        (b"1\n0 0 3\n0 0 0\n0 1 0\n", b"1\n9 0 4\n0 9 3\n0 0 1\n"),
+        (lighting, lighting),
+    ];
+    let meshes: [&[u8]; 2] = [PLY.as_bytes(), OBJ.as_bytes()];
+    for (format, (first, second)) in cameras.into_iter().enumerate() {
+        for (kind, mesh) in meshes.into_iter().enumerate() {
+            for (name, last) in [("labels", labels), ("measured", MEASURED.as_bytes())] {
+                let lengths = [first.len(), second.len(), mesh.len()].map(|length| (length as u32).to_le_bytes()).concat();
+                let bytes = [&[format as u8, kind as u8][..], &lengths, first, second, mesh, last].concat();
+                keep(corpus, "capture", &format!("{format}_{kind}_{name}"), &bytes)?;
+            }
+        }
+    }
     Ok(())
 }
 
