@@ -249,7 +249,7 @@ impl LightRules {
             stage: StageRules::default(),
             fit: FitRules::default(),
             relit: RelitRules::with_alone(1),
-            samples: SampleRules { seed: "mateval".to_owned(), at_320x240: 32, least: 16, most: 64, block_pixels: 16 },
+            samples: SampleRules { seed: "mateval".to_owned(), at_320x240: 16, least: 16, most: 32, block_pixels: 16 },
         }
     }
 
@@ -378,6 +378,6 @@ mod tests {
         let samples = Protocol::named("mateval-3").unwrap().light.samples;
         let sizes = [(64, 48), (160, 120), (240, 180), (320, 240), (400, 300), (480, 270), (640, 480)];
         let found = sizes.map(|(width, height): (u64, u64)| samples.each_half(width * height));
-        assert_eq!(found, [64, 64, 56, 32, 20, 18, 16]);
+        assert_eq!(found, [32, 32, 28, 16, 16, 16, 16]);
     }
 }
