@@ -39,7 +39,7 @@ printf '%s\n' 'name = "sample"' 'resolution = [96, 72]' 'atlas_size = 128' \
 "$mateval" prep render "$work/dataset" --renderer builtin --samples 1 --scorer-samples 16
 
 {
-    printf '%s\n' 'name = "eight"' 'resolution = [48, 36]' 'atlas_size = 64'
+    printf '%s\n' 'name = "eight"' 'resolution = [32, 24]' 'atlas_size = 64'
     for number in 1 2 3 4 5 6 7 8; do
         printf '%s\n' '[[scene]]' "id = \"room$number\"" 'bitterli = "room/scene.xml"' 'house = "sample"'
     done

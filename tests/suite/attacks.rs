@@ -53,12 +53,16 @@ impl Rooms {
         self.folder.join(name)
     }
 
-    /// Writes the submission of a baseline on the photo, made from the public files of a dataset.
-    fn honest(&self, name: &str, dataset: &str, estimate: &str) -> PathBuf {
-        let out = self.path(&format!("{name}_{dataset}_{estimate}"));
+    /// Writes the submission of a baseline on what `delight` makes of the photo, from the public files of a dataset.
+    fn honest(&self, name: &str, dataset: &str) -> PathBuf {
+        let [root, estimate, out] =
+            [dataset, &format!("delit_{dataset}"), &format!("{name}_{dataset}")].map(|name| self.path(name));
         let _writing = self.writing.lock().unwrap();
+        if !estimate.exists() {
+            run(&mut baseline("delight", &root, &estimate)).ends_with(0);
+        }
         if !out.exists() {
-            run(baseline(name, &self.path(dataset), &out).args(["--estimate", estimate])).ends_with(0);
+            run(baseline(name, &root, &out).args(["--adapter", "delight", "--estimate"]).arg(&estimate)).ends_with(0);
         }
         out
     }
@@ -135,7 +139,7 @@ fn write_colors(submission: &Path, instance: &str, colors: &Picture<LinearRgb>) 
 /// The submission of somebody who knows textures by shape; what is not known has the medians of the photo.
 fn remembered(rooms: &Rooms, dataset: &str) -> PathBuf {
     let out = rooms.path(&format!("remembered_{dataset}"));
-    copy_folder(&rooms.honest("median", dataset, "delight"), &out);
+    copy_folder(&rooms.honest("median", dataset), &out);
     undressed_atlases(rooms, dataset).iter().for_each(|(instance, colors)| write_colors(&out, instance, colors));
     out
 }
@@ -144,8 +148,8 @@ fn remembered(rooms: &Rooms, dataset: &str) -> PathBuf {
 /// offset that bring them nearest to the colours of `nn`. `flat` has a scale of 0, so that nothing is remembered.
 fn recolored(rooms: &Rooms, dataset: &str, flat: bool) -> PathBuf {
     let out = rooms.path(&format!("recolored_{dataset}_{flat}"));
-    copy_folder(&rooms.honest("median", dataset, "delight"), &out);
-    let seen = rooms.honest("nn", dataset, "delight");
+    copy_folder(&rooms.honest("median", dataset), &out);
+    let seen = rooms.honest("nn", dataset);
     for (instance, colors) in undressed_atlases(rooms, dataset) {
         let seen = seen.join("scenes/room").join(&instance).join("base_color.png");
         let seen = read_texture(&seen, Encoding::Srgb, Wrap::Clamp).unwrap();
@@ -184,8 +188,8 @@ fn line(pairs: &[(f32, f32)]) -> (f32, f32) {
 fn remembered_textures_fall_below_the_medians() {
     let rooms = &*SAMPLE;
     let psnr = |made: &str, scored: &str| {
-        let nn = rooms.psnr(&rooms.honest("nn", made, "delight"), scored);
-        let median = rooms.psnr(&rooms.honest("median", made, "delight"), scored);
+        let nn = rooms.psnr(&rooms.honest("nn", made), scored);
+        let median = rooms.psnr(&rooms.honest("median", made), scored);
         (rooms.psnr(&remembered(rooms, made), scored), nn, median)
     };
     let (undressed, redressed) = (psnr("undressed", "undressed_scored"), psnr("public", "redressed_scored"));
@@ -221,7 +225,7 @@ fn shown_results_are_no_oracle() {
     let [submission, result, rounded, floor] =
         ["constant", "result.json", "rounded.json", "floor.json"].map(|name| out.path().join(name));
     let whole = rooms.path("redressed_scored");
-    run(&mut score(&rooms.honest("nn", "public", "delight"), &whole, &floor)).ends_with(0);
+    run(&mut score(&rooms.honest("nn", "public"), &whole, &floor)).ends_with(0);
     run(&mut baseline("grey", &rooms.path("public"), &submission)).ends_with(0);
     let maps: Vec<PathBuf> =
         files_below(&submission).into_iter().filter(|file| file.ends_with("base_color.png")).collect();
@@ -262,7 +266,7 @@ fn shown_results_are_no_oracle() {
     let at_floor = best_constant.1["at_floor"]["mateval-3"].as_array().unwrap();
     assert!(at_floor.contains(&"albedo.novel.psnr".into()), "{}", best_constant.1);
     let guess = scored(&|_| solved([mse(headline["albedo.novel.psnr"].as_f64().unwrap()); 4])).0;
-    let median = rooms.psnr(&rooms.honest("median", "public", "delight"), "redressed_scored");
+    let median = rooms.psnr(&rooms.honest("median", "public"), "redressed_scored");
     let honest = psnr(&json(&floor));
     let all = format!(
         "oracle of instances {oracle}, best constant {}, constant of the shown numbers {}, median {median}, nn {honest}",

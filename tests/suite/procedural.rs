@@ -71,6 +71,15 @@ static SUBMISSION: LazyLock<PathBuf> = LazyLock::new(|| {
     out
 });
 
+/// The submission with `--keep-seen`. A slash at the end of its path does not move its report.
+static KEPT: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("procedural-kept");
+    let out = folder.join("kept/");
+    procedural(&out, &["--keep-seen"], 2).ends_with(0).prints("kept.report/index.html");
+    assert!(folder.join("kept.report/report.json").is_file());
+    out
+});
+
 /// Mean square error of the floor's base colour over all its texels, those that the input view does not show included,
 /// with `moved` added to every place of the truth.
 fn floor_error(submission: &Path, moved: DVec3) -> f64 {
@@ -116,14 +125,10 @@ fn a_pattern_continues_where_nothing_is_seen() {
 }
 
 /// The estimate has base colour alone: one-coloured parts have the format's roughness, graphs their own, and nothing is a
-/// mirror. A slash at the end of the submission's path does not move its report.
+/// mirror.
 #[test]
 fn maps_that_the_estimate_lacks_are_no_zeros() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("kept/");
-    procedural(&out, &["--keep-seen"], 2).ends_with(0).prints("kept.report/index.html");
-    assert!(folder.path().join("kept.report/report.json").is_file());
-    for submission in [&out, &*SUBMISSION] {
+    for submission in [&*KEPT, &*SUBMISSION] {
         let path = |map: &str| submission.join("scenes/room/floor").join(map);
         let bytes = |map: &str| image::open(path(map)).unwrap().to_luma8().into_raw();
         assert!(bytes("roughness.png").iter().all(|byte| *byte > 25), "{submission:?}");
@@ -176,8 +181,7 @@ fn the_report_shows_what_was_baked() {
 #[test]
 fn seen_texels_are_kept_on_request() {
     let folder = tempfile::tempdir().unwrap();
-    let [kept, nn] = ["kept", "nn"].map(|name| folder.path().join(name));
-    procedural(&kept, &["--keep-seen"], 2).ends_with(0);
+    let nn = folder.path().join("nn");
     run(baseline("nn", &ROOM, &nn).args(words())).ends_with(0);
     let dataset = Dataset::open(&ROOM).unwrap();
     let scene = &dataset.scenes[0];
@@ -186,7 +190,7 @@ fn seen_texels_are_kept_on_request() {
     let seen = SeenPixels::new(&geometry, (picture.width(), picture.height()));
     let estimate = Estimate { base_color: Some(picture), ..Estimate::default() };
     let all = |submission: &Path| base_colors(submission).into_iter().collect::<BTreeMap<_, _>>();
-    let [kept_colors, nn_colors, graph_colors] = [&kept, &nn, &SUBMISSION].map(|submission| all(submission));
+    let [kept_colors, nn_colors, graph_colors] = [&*KEPT, &nn, &SUBMISSION].map(|submission| all(submission));
     let mut counts = [0; 2];
     for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
         let [kept, nn, graph] = [&kept_colors, &nn_colors, &graph_colors].map(|colors| &colors[instance.id.as_str()]);
@@ -209,7 +213,7 @@ fn seen_texels_are_kept_on_request() {
         }
     }
     assert!(counts[0] > 5_000 && counts[1] > 500, "{counts:?}");
-    assert!(floor_error(&kept, DVec3::ZERO) < 0.25 * floor_error(&nn, DVec3::ZERO));
+    assert!(floor_error(&KEPT, DVec3::ZERO) < 0.25 * floor_error(&nn, DVec3::ZERO));
 }
 
 #[test]

@@ -97,7 +97,7 @@ fn the_stated_error_is_the_spread() {
     let paths: Vec<&Path> = submissions.iter().map(|(_, path)| path.as_path()).collect();
     let all: Vec<Vec<ProtocolResult>> =
         (0..SEEDS).map(|seed| results(&paths, &samples(8, &format!("seed {seed}")), &["room"])).collect();
-    let exact = results(&paths, &samples(256, "exact"), &["room"]);
+    let exact = results(&paths, &samples(96, "exact"), &["room"]);
     let mut ratios = Vec::new();
     for (at, (name, _)) in submissions.iter().enumerate() {
         for key in ["rgb_true.input.psnr", "rgb_true.novel.psnr", "rgb_relit.input.psnr", "rgb_relit.novel.psnr"] {
