@@ -66,7 +66,7 @@ tested=0
 for python in $found; do
     "$python" --version
     fewer=""
-    [ "${newest:-$python}" = "$python" ] || fewer="not is_the_commands and not eight_threads"
+    [ "${newest:-$python}" = "$python" ] || fewer="not is_the_commands"
     "$python" -m venv "$work/env$tested"
     "$work/env$tested/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl pytest mypy trimesh pandas nbclient ipykernel
     MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$dist" \

@@ -117,7 +117,8 @@ fn archives(corpus: &Path, work: &Path) -> Result<(), Box<dyn std::error::Error>
     Ok(())
 }
 
-/// A triangle with a camera of every format, and the labels of a NumPy file or measured colours after it.
+/// A triangle with a camera of every format but `.npz`, whose archive is empty, and after it labels of a NumPy file or
+/// measured colours.
 fn captures(corpus: &Path, labels: &[u8]) -> std::io::Result<()> {
     const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
         element face 1\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n\
@@ -135,8 +136,8 @@ fn captures(corpus: &Path, labels: &[u8]) -> std::io::Result<()> {
     // One camera: its number, its model, width and height as 64 bits, four parameters. One photo: number, pose, camera,
     // name, no points.
     let camera = of(&[1, 0, 1, 1, 8, 0, 6, 0], &[9.0, 9.0, 4.0, 3.0]);
-    let image = [of(&[1, 0, 1], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0]), of(&[1], &[]), b"a.png\0".to_vec(), of(&[0; 2], &[])];
-    let image = image.concat();
+    let pose = of(&[1, 0, 1], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0]);
+    let image = [pose, of(&[1], &[]), b"a.png\0".to_vec(), of(&[0; 2], &[])].concat();
     // A camera with rows of K, of its rotation, of its translation and of its size.
     let lighting = b"9 0 4\n0 9 3\n0 0 1\n1 0 0\n0 1 0\n0 0 1\n0 0 3\n8 6 3\n";
     let cameras: [(&[u8], &[u8]); 6] = [
