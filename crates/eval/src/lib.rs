@@ -7,8 +7,8 @@
 //! those that they may not. For each [`scene`] of the dataset ([`open_scene`]), [`score()`](score::score) reads the
 //! submissions' maps ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
 //!
-//! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]), removes their scale, and compares
-//!    the pictures with the [`truth`]'s.
+//! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]) and compares the pictures with the
+//!    [`truth`]'s, base colour also without its scale.
 //! 2. [`light`] renders the maps under every light and compares the renders with R, the scorer's own render of the true
 //!    maps ([`light::reference`]). The true maps travel along the paths of every prediction (`light::shared_paths`,
 //!    [`light::own_lights`]), so that what few paths miss or exaggerate of both cancels: [`light::difference`] turns

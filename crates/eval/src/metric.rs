@@ -1,7 +1,8 @@
 //! The metrics, one row each, and the kinds of pictures that they compare.
 //!
 //! A row states everything about its metric: results, tables, boards and section 3 of `dataset_spec/PROTOCOL.md` follow
-//! from it. A new metric is a file of the crate `metrics`, a row here, and that section again, which a test of [`crate::protocol`] writes.
+//! from it. Squared errors alone are computed elsewhere: of maps by [`crate::materials::score`], of light by
+//! [`crate::light::mse`]. A new metric is a file of the crate `metrics`, a row here, and that section again, which a test of [`crate::protocol`] writes.
 
 use mateval_dataset::submission::Map;
 use mateval_dataset::word_enum;
@@ -170,7 +171,7 @@ metrics! {
         of: &[COLOURS, TEXELS],
         measure: Measure::SquaredError,
         stated: Stated::Exactly,
-        definition: "10 log10(1 / MSE) in dB, at most 100. `exact` marks an MSE of 0 without noise; it counts as \
+        definition: "10 log10(1 / MSE) in dB, at most 100; of light section 8 bounds the MSE. `exact` marks an MSE of 0 without noise; it counts as \
             100 dB in means",
     };
     Ssim = "ssim" => MetricRow {

@@ -86,7 +86,7 @@ impl Protocol {
     pub const NAMES: [&str; 3] = ["mateval-3", "paper", CAPTURE];
 
     pub fn named(name: &str) -> Result<Self, EvalError> {
-        // PSNR under fitted light is near 22 dB, so a few plain samples are enough.
+        // PSNR under fitted light is near 22 dB, so 16 plain samples are enough at any size.
         let fitted = || {
             let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
             light.samples.fix(16);
@@ -171,7 +171,7 @@ pub enum Track {
     Fitted,
     /// The scene's own emitters.
     True,
-    /// The same emitters with weights that no method has seen.
+    /// The same emitters with weights that no method has seen. Only together with `true`.
     Relit,
 }
 
@@ -212,14 +212,14 @@ pub struct LightRules {
 pub struct SampleRules {
     /// First word of the texts whose hashes seed the paths.
     pub seed: String,
-    /// Samples per pixel of each half of a view of 320x240 pixels; inversely as many as a view has pixels, rounded to
-    /// an even number.
+    /// Samples per pixel of each half of a view of 320x240 pixels; of other sizes in inverse proportion to the number of
+    /// pixels, rounded to an even number.
     pub at_320x240: u32,
     /// The least number of samples of a half.
     pub least: u32,
     /// The largest number of samples of a half.
     pub most: u32,
-    /// Side of the blocks of pixels within which noise counts as correlated, in pixels of the input view.
+    /// Side of the blocks of pixels within which noise counts as correlated, in pixels of the first view from each place.
     pub block_pixels: u32,
 }
 
@@ -237,7 +237,7 @@ impl SampleRules {
 }
 
 impl LightRules {
-    /// Rules with the values that all protocols share.
+    /// Rules of `mateval-3`; [`Protocol::named`] changes the samples of the others.
     pub fn new(tracks: Vec<Track>, flavour: PrincipledFlavour) -> Self {
         let settings = mateval_tracer::RenderSettings::default();
         Self {

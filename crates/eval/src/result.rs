@@ -91,11 +91,12 @@ pub struct ProtocolResult {
     pub protocol: Protocol,
     /// Numbers of different fingerprints must not be compared.
     pub fingerprint: String,
-    /// Mean over scenes.
+    /// Mean over scenes. A PSNR that is a lower bound in a picture counts like any other.
     pub summary: BTreeMap<ResultKey, f64>,
     /// Mean over pictures of each scene, by the same keys.
     pub scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
-    /// Standard errors of the means of PSNR in `summary` due to render noise, in dB.
+    /// Standard errors of the means of PSNR of light in `summary` due to render noise, in dB. Left out unless every scene
+    /// with a value has one in `noise`.
     pub summary_noise: BTreeMap<ResultKey, f64>,
     /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where
     /// the error of a picture may be noise alone.
@@ -217,7 +218,7 @@ pub struct PictureValues {
     /// The value of each metric; those are left out for which no pixel or window counts.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub values: BTreeMap<Metric, f64>,
-    /// Of light: the standard error of the MSE due to render noise.
+    /// Of light: the standard error of the MSE due to the noise of the prediction's own paths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mse_error: Option<f64>,
     /// The MSE was exactly zero, and its PSNR is the cap.

@@ -27,6 +27,7 @@ use crate::result::key::{PictureName, Region, ResultKey, Surfaces, Views};
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, MeasuredValues, PictureValues};
 use crate::truth::ViewTruth;
 
+/// The inputs for scoring all submissions in one set of views of a scene.
 #[derive(Clone)]
 pub(crate) struct SceneTask<'a> {
     pub(crate) dataset: &'a Path,
@@ -49,7 +50,7 @@ pub(crate) struct SceneTask<'a> {
 }
 
 pub(crate) struct BaseColors {
-    /// From the true atlases.
+    /// Looked up in the true atlases as predictions are in theirs, unlike [`ViewTruth::albedo`], which the dataset holds.
     pub(crate) truth: Vec<Picture<LinearRgb>>,
     pub(crate) predicted: Vec<Vec<Picture<LinearRgb>>>,
 }
@@ -70,7 +71,7 @@ pub(crate) struct MaskedRegion {
 
 impl SceneTask<'_> {
     /// The same task over one set of its views; absent if the set is empty.
-    pub(crate) fn of(&self, set: ViewSet) -> Option<Self> {
+    pub(crate) fn over(&self, set: ViewSet) -> Option<Self> {
         let views = set.of(&self.views);
         (!views.is_empty()).then(|| Self { views, set, ..self.clone() })
     }

@@ -154,7 +154,7 @@ fn score_scenes(
             let Some(scene) = scenes.get(at) else { break };
             let finished = done.iter().filter(|outcome| outcome.get().is_some()).count();
             progress(Report::part(&format!("scene {}", scene.id), finished, scenes.len()));
-            let outcome = score_one(plan, scene, progress);
+            let outcome = score_or_recall(plan, scene, progress);
             if outcome.is_err() {
                 next.store(scenes.len(), Ordering::Relaxed);
             }
@@ -170,7 +170,7 @@ fn score_scenes(
     done.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) -> Result<Vec<Outcome>, EvalError> {
+fn score_or_recall(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) -> Result<Vec<Outcome>, EvalError> {
     let atlases = AtlasMeshes::on_demand(plan.dataset, scene);
     let read = |path: &&Path| read_scene(path, scene, &atlases);
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(read).collect::<Result<_, _>>()?;
@@ -180,7 +180,7 @@ fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) ->
     let uncached: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
     if !uncached.is_empty() {
         let chosen: Vec<PredictedScene> = uncached.iter().map(|&at| predictions[at].clone()).collect();
-        let (found, opened) = plan.score_uncached(scene, &chosen, progress)?;
+        let (found, opened) = plan.open_and_score(scene, &chosen, progress)?;
         open = Some(opened);
         for (&at, found) in uncached.iter().zip(found) {
             plan.write_cache(scene, &predictions[at], &found)?;
@@ -329,7 +329,7 @@ impl<'a> ScorePlan<'a> {
     }
 
     /// The scores, and the scene that was opened for them.
-    fn score_uncached(
+    fn open_and_score(
         &self,
         scene: &SceneFile,
         predictions: &[PredictedScene],
@@ -624,15 +624,15 @@ fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> 
             }
         }
     } else if !scoring.is_empty() {
-        for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {
-            let wanted = |at: usize| scores(at) && (task.set == ViewSet::Turned || task.protocols[at].wide_views);
+        for part in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.over(set)) {
+            let wanted = |at: usize| scores(at) && (part.set == ViewSet::Turned || task.protocols[at].wide_views);
             if !(0..task.protocols.len()).any(wanted) {
                 continue;
             }
-            let truths = task.truths()?;
-            let base_colors = task.score_materials(&truths, &wanted, &mut sheets)?;
+            let truths = part.truths()?;
+            let base_colors = part.score_materials(&truths, &wanted, &mut sheets)?;
             for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
-                score_light(&task, &truths, &base_colors, at, &mut sheets)?;
+                score_light(&part, &truths, &base_colors, at, &mut sheets)?;
             }
         }
         task.score_texels(&mut sheets)?;

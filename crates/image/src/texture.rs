@@ -138,6 +138,10 @@ impl Texture {
     /// The linear value at `uv`, bilinear. A coordinate that is not finite or beyond 1e9 reads as 0.
     #[inline]
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
+        // Most maps of roughness and metallic are collapsed to a texel.
+        if self.width == 1 && self.height == 1 {
+            return self.texel(0, 0);
+        }
         // The kind of texels is matched once a lookup, not once a texel.
         match self.texels.as_ref() {
             Texels::Srgb8(v) => self.bilinear(uv, |at| v[at].map(linear_from_srgb_byte)),

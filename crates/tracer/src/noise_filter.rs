@@ -66,13 +66,13 @@ pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) 
     let mut pixels: Vec<Light> = (0..width * height).into_par_iter().map(divided).collect();
     // One pixel's difference says little of its noise: take the mean over its neighbours. What stands out of all of
     // them in one half alone is noise too.
-    pixels = filter(surfaces, |x, y| {
-        let mut found = pixels[y * width + x];
-        found.variance = found.variance.max(mean_variance(surfaces, &pixels, x, y));
+    pixels = filter(surfaces, |at| {
+        let mut found = pixels[at[1] * width + at[0]];
+        found.variance = found.variance.max(mean_variance(surfaces, &pixels, at));
         found
     });
     for pass in 0..PASSES {
-        pixels = filter(surfaces, |x, y| smoothed(surfaces, &pixels, x, y, 1 << pass));
+        pixels = filter(surfaces, |at| smoothed(surfaces, &pixels, at, 1 << pass));
     }
     Picture::from_fn(width, height, |x, y| {
         let k = y * width + x;
@@ -86,53 +86,58 @@ pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) 
 }
 
 /// Computes the valid pixels.
-fn filter(surfaces: &Surfaces<'_>, pixel: impl Fn(usize, usize) -> Light + Sync) -> Vec<Light> {
+fn filter(surfaces: &Surfaces<'_>, pixel: impl Fn([usize; 2]) -> Light + Sync) -> Vec<Light> {
     let (width, height) = (surfaces.valid.width(), surfaces.valid.height());
     let rows = (0..height).into_par_iter().flat_map_iter(|y| {
         let pixel = &pixel;
-        (0..width).map(move |x| if surfaces.valid.get(x, y) { pixel(x, y) } else { Light::default() })
+        (0..width).map(move |x| if surfaces.valid.get(x, y) { pixel([x, y]) } else { Light::default() })
     });
     rows.collect()
 }
 
-/// The pixels of one surface around (x, y), at `step` pixels from each other, with the weight of their place.
-fn around<'g>(
-    surfaces: &'g Surfaces<'_>,
-    x: usize,
-    y: usize,
+/// Visits the pixels of one surface around (x, y), at `step` pixels from each other, with the weight of their place.
+fn visit_around(
+    surfaces: &Surfaces<'_>,
+    [x, y]: [usize; 2],
     step: isize,
     reach: isize,
-) -> impl Iterator<Item = (usize, f32)> + use<'g> {
+    mut visit: impl FnMut(usize, f32),
+) {
     let (width, height) = (surfaces.valid.width(), surfaces.valid.height());
+    let (valid, instances, normals) = (surfaces.valid.pixels(), surfaces.instances.pixels(), surfaces.normals.pixels());
     let here = y * width + x;
-    let (instance, normal) = (surfaces.instances.pixels()[here], surfaces.normals.pixels()[here].0);
-    (-reach..=reach).flat_map(move |dy| (-reach..=reach).map(move |dx| (dx, dy))).filter_map(move |(dx, dy)| {
-        let column = x.checked_add_signed(step * dx).filter(|&column| column < width)?;
-        let row = y.checked_add_signed(step * dy).filter(|&row| row < height)?;
-        let there = row * width + column;
-        let other = surfaces.normals.pixels()[there].0;
-        let cosine: f32 = (0..3).map(|c| normal[c] * other[c]).sum();
-        let is_alike = surfaces.valid.pixels()[there]
-            && surfaces.instances.pixels()[there] == instance
-            && (there == here || cosine >= LEAST_COSINE);
-        let weight = |distance: isize| KERNEL[distance.unsigned_abs()];
-        is_alike.then(|| (there, weight(dx) * weight(dy)))
-    })
+    for dy in -reach..=reach {
+        let Some(row) = y.checked_add_signed(step * dy).filter(|&row| row < height) else { continue };
+        for dx in -reach..=reach {
+            let Some(column) = x.checked_add_signed(step * dx).filter(|&column| column < width) else { continue };
+            let there = row * width + column;
+            if !valid[there] || instances[there] != instances[here] {
+                continue;
+            }
+            let cosine: f32 = (0..3).map(|c| normals[here].0[c] * normals[there].0[c]).sum();
+            if there == here || cosine >= LEAST_COSINE {
+                visit(there, KERNEL[dx.unsigned_abs()] * KERNEL[dy.unsigned_abs()]);
+            }
+        }
+    }
 }
 
-fn mean_variance(surfaces: &Surfaces<'_>, pixels: &[Light], x: usize, y: usize) -> f32 {
-    let (sum, weights) = around(surfaces, x, y, 1, 3)
-        .fold((0.0, 0.0), |(sum, weights), (k, weight)| (sum + weight * pixels[k].variance, weights + weight));
+fn mean_variance(surfaces: &Surfaces<'_>, pixels: &[Light], at: [usize; 2]) -> f32 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    visit_around(surfaces, at, 1, 3, |there, weight| {
+        sum += weight * pixels[there].variance;
+        weights += weight;
+    });
     sum / weights
 }
 
 /// One pass of the filter.
-fn smoothed(surfaces: &Surfaces<'_>, pixels: &[Light], x: usize, y: usize, step: isize) -> Light {
-    let here = pixels[y * surfaces.valid.width() + x];
+fn smoothed(surfaces: &Surfaces<'_>, pixels: &[Light], at: [usize; 2], step: isize) -> Light {
+    let here = pixels[at[1] * surfaces.valid.width() + at[0]];
     let (own, allowed) = (luminance(here.value), DEVIATIONS * DEVIATIONS * here.variance);
     let (mut sum, mut variance, mut weights) = ([0.0; 3], 0.0, 0.0);
-    for (k, place) in around(surfaces, x, y, step, 1) {
-        let there = pixels[k];
+    visit_around(surfaces, at, step, 1, |there, place| {
+        let there = pixels[there];
         let difference = (luminance(there.value) - own).powi(2);
         // Without noise, only equal pixels are averaged.
         let alike = if difference > 0.0 { allowed / (allowed + difference) } else { 1.0 };
@@ -140,7 +145,7 @@ fn smoothed(surfaces: &Surfaces<'_>, pixels: &[Light], x: usize, y: usize, step:
         (0..3).for_each(|c| sum[c] += weight * there.value[c]);
         variance += weight * weight * there.variance;
         weights += weight;
-    }
+    });
     Light { value: sum.map(|v| v / weights), variance: variance / (weights * weights) }
 }
 

@@ -21,7 +21,8 @@
 //! f clips above 1 and encodes to sRGB, f' is its slope. Encoding is a curve, so the mean of encoded noise is not the
 //! encoded mean. Here the curve is replaced by its tangent at a pivot p that half h does not know: X_h is linear in
 //! m_h, and its mean is the encoded mean as far as the pivot is right. m_i is a control variate (Owen, "Monte Carlo
-//! theory, methods and examples", section 8.9) that moves no expectation, whatever r is. For the true maps q = t and r
+//! theory, methods and examples", section 8.9) that moves no expectation, whatever r is, as
+//! far as R is the mean of t. For the true maps q = t and r
 //! = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of paths.
 
 use mateval_image::transfer::srgb_from_linear;

@@ -2,8 +2,8 @@
 //!
 //! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the
 //! encoded difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is
-//! the squared true difference, whatever the noise. Each half consists of two quarters, whose difference u (of X) or v
-//! (of Y) has the half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the
+//! the squared true difference, whatever the noise. Each half consists of two quarters. Half of their difference, encoded
+//! as X (or Y) is, has the half's noise and nothing else: u (or v). With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the
 //! expectation of (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, whatever the distribution of the noise, if
 //! quarters are independent: of the squares d x, d y and x y that make the variance, the first two terms count x y
 //! twice, the last takes it away once. Where few large contributions make it small or negative, half of the first two
@@ -44,21 +44,25 @@ pub type BlockSums = [f64; 3];
 
 fn variance<'a>(blocks: impl Iterator<Item = &'a BlockSums>, common: f64) -> f64 {
     let (mut squares, mut products) = (0.0, 0.0);
-    for [first_half, second_half, both_halves] in blocks {
-        squares += first_half.powi(2) + second_half.powi(2);
-        products += both_halves.powi(2);
+    for [yu, xv, uv] in blocks {
+        squares += yu.powi(2) + xv.powi(2);
+        products += uv.powi(2);
     }
     (squares - products).max(squares / 2.0) + common.powi(2)
 }
 
 impl LightMse {
-    /// The error over the pixels of the mask and their channels; absent if no pixel counts. `blocks` holds the block of
-    /// each pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
-    pub fn new(difference: &LightDifference, mask: &Mask, blocks: &Picture<u64>) -> Result<Option<Self>, MetricError> {
+    /// The error over the pixels of the mask and their channels; absent if no pixel counts. `block_ids` holds the
+    /// block of each pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
+    pub fn new(
+        difference: &LightDifference,
+        mask: &Mask,
+        block_ids: &Picture<u64>,
+    ) -> Result<Option<Self>, MetricError> {
         let LightDifference { halves: [first, second], noise: [u, v], .. } = difference;
         let (mut sum, mut values) = (0.0, 0_usize);
         let mut by_block: BTreeMap<u64, BlockSums> = BTreeMap::new();
-        for (at, block) in blocks.pixels().iter().enumerate().filter(|&(at, _)| mask.pixels()[at]) {
+        for (at, block) in block_ids.pixels().iter().enumerate().filter(|&(at, _)| mask.pixels()[at]) {
             let noise = by_block.entry(*block).or_default();
             for c in 0..3 {
                 let [x, y, u, v] = [first, second, u, v].map(|picture| f64::from(picture.pixels()[at].0[c]));
@@ -97,7 +101,7 @@ impl LightMse {
     /// The PSNR of [`Self::bounded`]: it never rises with `mse`, nor jumps. It is exact where neither error nor noise
     /// is left.
     pub fn psnr(&self) -> Result<Psnr, MetricError> {
-        Psnr::from_mse(self.bounded().max(0.0))
+        Psnr::from_mse(self.bounded())
     }
 }
 

@@ -61,6 +61,7 @@ pub(super) fn compare_under_own_lights(
     let paths = SharedPaths { scene, world: &world, atlases, rules, pass: task.set.pass("own"), progress };
     let truth = true_maps(task.folder, task.scene)?;
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
+    // All views of a set have one size.
     let samples = rules.samples.each_half(task.pixels().next().unwrap_or(0));
     // A batch holds a render and four quarters of every prediction.
     let bytes = 5 * (lightings.len() as u64) * task.pixels().sum::<u64>() * size_of::<LinearRgb>() as u64;
@@ -77,7 +78,7 @@ pub(super) fn compare_under_own_lights(
     };
     // Where a prediction is the truth texel by texel, every m is R (see `difference`), so no path is traced.
     let is_truth = |&index: &usize| task.predictions[index].materials == truth.materials;
-    let (exact, others): (Vec<usize>, Vec<usize>) = (0..task.predictions.len()).partition(is_truth);
+    let (exact, traced): (Vec<usize>, Vec<usize>) = (0..task.predictions.len()).partition(is_truth);
     for index in exact {
         let ratios = base_colors.ratios(index);
         for lighting in &lightings {
@@ -85,13 +86,14 @@ pub(super) fn compare_under_own_lights(
             compare(index, &ratios, lighting, quarters.collect(), 0)?;
         }
     }
-    for batch in batches(task.predictions, &others, 1, bytes) {
+    // The truth travels along.
+    for batch in batches(task.predictions, &traced, 1, bytes) {
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
         let repaint = paths.repaint(&predictions, Some(&truth))?;
         let mixes = vec![mixes.clone(); repaint.predictions()];
         let ratios: Vec<Vec<Picture<LinearRgb>>> = batch.iter().map(|&index| base_colors.ratios(index)).collect();
         let corrected = |renders: &[ViewsRender], prediction: usize, lighting: usize, view: usize| {
-            // The truth travels last.
+            // It is the last.
             let [own, truth] = [prediction, batch.len()].map(|at| picture_of(&renders[at], view, lighting));
             let (reference, ratio) = (&lightings[lighting].references[view].linear, &ratios[prediction][view]);
             corrected_quarter(own, truth, task.scene.exposure, reference, ratio)
@@ -100,7 +102,7 @@ pub(super) fn compare_under_own_lights(
             paths.quarters(&repaint, &mixes, &cameras, batch.len(), samples, corrected)?;
         for (at, &index) in batch.iter().enumerate() {
             for (picture, lighting) in lightings.iter().enumerate() {
-                // The scene's count, once.
+                // One set of paths serves all lightings: its count goes to the first.
                 let not_finite = std::mem::take(&mut not_finite[at]);
                 compare(index, &ratios[at], lighting, std::mem::take(&mut quarters[at][picture]), not_finite)?;
             }

@@ -111,7 +111,7 @@ impl<'a> LightMeter<'a> {
 
     fn measure(&self, lit: &LitViews<'_>, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
         let kind = lit.track.picture();
-        // Relit light has no specular regions of its own.
+        // Only the scene's own light is scored on specular surfaces.
         let is_wanted = |region: &&MaskedRegion| match region.surfaces {
             Surfaces::All => true,
             Surfaces::Specular => kind == PictureKind::RgbTrue && region.region == Region::Valid,

@@ -120,14 +120,14 @@ impl SharedPaths<'_> {
 }
 
 /// Groups `predictions` (numbers of `all`) that share paths: those that agree in roughness and metallic, as many as the
-/// tracer takes at once beside `others` more and as fit in memory, where each takes `bytes`.
-pub(crate) fn batches(all: &[PredictedScene], predictions: &[usize], others: usize, bytes: u64) -> Vec<Vec<usize>> {
+/// tracer takes at once beside what travels `along` and as fit in memory, where each takes `bytes`.
+pub(crate) fn batches(all: &[PredictedScene], predictions: &[usize], along: usize, bytes: u64) -> Vec<Vec<usize>> {
     let mut alike: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for &index in predictions {
         alike.entry(&all[index].scattering_key).or_default().push(index);
     }
-    let at_once = mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE - others;
-    let in_memory = (BATCH_BYTES / bytes.max(1)).saturating_sub(others as u64);
+    let at_once = mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE - along;
+    let in_memory = (BATCH_BYTES / bytes.max(1)).saturating_sub(along as u64);
     let most = at_once.min(in_memory.max(1) as usize);
     alike.into_values().flat_map(|alike| alike.chunks(most).map(<[usize]>::to_vec).collect::<Vec<_>>()).collect()
 }
