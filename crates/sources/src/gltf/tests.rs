@@ -342,24 +342,6 @@ fn kinds_are_counted() {
     assert!(messages.contains(&"KHR_materials_sheen: not represented (2 times; the first is named)"), "{messages:?}");
 }
 
-/// Values that the format's or the reader's defaults replace.
-#[test]
-fn each_replacement_is_a_finding() {
-    let material = |key: &str, value: Value| with("/materials/0", json!({ "pbrMetallicRoughness": {}, key: value }));
-    let extension = |name: &str, value: Value| material("extensions", json!({ name: value }));
-    for (file, code) in [
-        (with("/nodes/0/rotation", json!([0, 0, 0, 0])), "bad_value"),
-        (extension("KHR_materials_ior", json!({ "ior": 9.0 })), "not_represented"),
-        (extension("KHR_materials_transmission", json!({ "transmissionFactor": 0.2 })), "not_represented"),
-        (triangle(), "no_light"),
-    ] {
-        let scene = read_json(&file);
-        assert!(scene.findings.iter().any(|finding| finding.code == code), "{code}: {:?}", scene.findings);
-    }
-    let plain = read_json(&triangle()).origins[0].stated;
-    assert!(!plain.base_color && plain.roughness, "the base colour is the format's default");
-}
-
 #[test]
 fn required_extensions_are_refused_by_name() {
     for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu", "ACME_new"] {
