@@ -19,132 +19,65 @@ fn fallback<I>(value: &'static str, input: I, code: &'static str) -> Fallback<I>
 }
 
 /// Of the reader of Mitsuba scenes. The input stands in a scene with a sensor.
-fn of_mitsuba() -> Vec<Fallback<&'static str>> {
+fn of_mitsuba() -> Vec<Fallback<String>> {
+    let in_cube = |inner: &str| format!("<shape type='cube'>{inner}</shape>");
+    let bsdf = |kind: &str, inner: &str| in_cube(&format!("<bsdf type='{kind}'>{inner}</bsdf>"));
+    let color = |name: &str, value: &str| bsdf("diffuse", &format!("<rgb name='{name}' value='{value}'/>"));
+    let string = |name: &str, value: &str| format!("<string name='{name}' value='{value}'/>");
+    let bitmap = |file: &str, extra: &str| {
+        let file = string("filename", file);
+        bsdf("diffuse", &format!("<texture name='reflectance' type='bitmap'>{file}{extra}</texture>"))
+    };
+    let checkerboard = bsdf("diffuse", "<texture name='reflectance' type='checkerboard'/>");
+    let anisotropic = "<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.4'/>";
+    let obj = "<shape type='obj'><string name='filename' value='plain.obj'/>";
+    let without_uv = bitmap("a b.png", "").replace("<shape type='cube'>", obj);
+    let blend = bsdf("blendbsdf", "<bsdf type='diffuse'/><bsdf type='plastic'/>");
+    let clearcoat = bsdf("principled", "<float name='clearcoat' value='1'/>");
+    let environment = format!("<emitter type='envmap'>{}</emitter>", string("filename", "none.exr"));
+    let low_sun = "<emitter type='sky'><vector name='sunDirection' value='0 -1 0'/></emitter>";
+    let bright = "<emitter type='area'><rgb name='radiance' value='bright'/></emitter>";
     vec![
-        fallback("diffuse grey 0.5", "<shape type='cube'/>", "no_bsdf"),
-        fallback("diffuse grey 0.5", "<shape type='cube'><bsdf type='velvet'/></shape>", "unknown_plugin"),
-        fallback("diffuse grey 0.5", "<shape type='cube'><bsdf type='twosided'/></shape>", "missing_child"),
-        fallback(
-            "linear mid-grey",
-            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='none.png'/></texture></bsdf></shape>",
-            "missing_file",
-        ),
-        fallback(
-            "linear mid-grey",
-            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/></bsdf></shape>",
-            "unknown_plugin",
-        ),
-        fallback(
-            "the plugin's default colour",
-            "<shape type='cube'><bsdf type='diffuse'><rgb name='reflectance' value='red'/></bsdf></shape>",
-            "bad_value",
-        ),
-        fallback(
-            "the plugin's default colour, for one out of range",
-            "<shape type='cube'><bsdf type='diffuse'><rgb name='reflectance' value='3'/></bsdf></shape>",
-            "out_of_range",
-        ),
-        fallback(
-            "the plugin's default colour, for one of an unknown name",
-            "<shape type='cube'><bsdf type='diffuse'><rgb name='reflectence' value='0.2'/></bsdf></shape>",
-            "unknown_parameter",
-        ),
-        fallback(
-            "the texture's colour as it is, of another range",
-            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='bytes.exr'/></texture></bsdf></shape>",
-            "out_of_range",
-        ),
-        fallback(
-            "the colour of the first of two",
-            "<shape type='cube'><bsdf type='blendbsdf'><bsdf type='diffuse'/><bsdf type='plastic'/></bsdf></shape>",
-            "unsupported",
-        ),
-        fallback(
-            "beckmann",
-            "<shape type='cube'><bsdf type='roughplastic'><string name='distribution' value='phong'/></bsdf></shape>",
-            "unsupported",
-        ),
+        fallback("diffuse grey 0.5", in_cube(""), "no_bsdf"),
+        fallback("diffuse grey 0.5", bsdf("velvet", ""), "unknown_plugin"),
+        fallback("diffuse grey 0.5", bsdf("twosided", ""), "missing_child"),
+        fallback("linear mid-grey", bitmap("none.png", ""), "missing_file"),
+        fallback("linear mid-grey", checkerboard, "unknown_plugin"),
+        fallback("the plugin's default colour", color("reflectance", "red"), "bad_value"),
+        fallback("the plugin's default colour, for one out of range", color("reflectance", "3"), "out_of_range"),
+        fallback("the plugin's default colour, for an unknown name", color("reflectence", "0.2"), "unknown_parameter"),
+        fallback("the texture's colour as it is, of another range", bitmap("bytes.exr", ""), "out_of_range"),
+        fallback("the colour of the first of two", blend, "unsupported"),
+        fallback("beckmann", bsdf("roughplastic", &string("distribution", "phong")), "unsupported"),
         fallback(
             "the default metal's colour",
-            "<shape type='cube'><bsdf type='conductor'><string name='material' value='Unobtainium'/></bsdf></shape>",
+            bsdf("conductor", &string("material", "Unobtainium")),
             "unknown_material",
         ),
-        fallback(
-            "no shape",
-            "<shape type='cube'><transform name='to_world'><matrix value='1'/></transform></shape>",
-            "bad_transform",
-        ),
-        fallback(
-            "no light",
-            "<emitter type='envmap'><string name='filename' value='none.exr'/></emitter>",
-            "missing_file",
-        ),
-        fallback("no light", "<emitter type='point'/>", "unknown_plugin"),
-        fallback(
-            "the first of two environments",
-            "<emitter type='constant'/><emitter type='constant'/>",
-            "unsupported",
-        ),
-        fallback("the sun 45 degrees high", "<emitter type='sky'/>", "sun_by_time"),
-        fallback(
-            "the sun at the horizon",
-            "<emitter type='sky'><vector name='sunDirection' value='0 -1 0'/></emitter>",
-            "out_of_range",
-        ),
-        fallback(
-            "radiance 1",
-            "<shape type='cube'><emitter type='area'><rgb name='radiance' value='bright'/></emitter></shape>",
-            "bad_value",
-        ),
-        fallback(
-            "the geometric mean of both",
-            "<shape type='cube'><bsdf type='roughconductor'><float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.4'/></bsdf></shape>",
-            "unsupported",
-        ),
-        fallback(
-            "0 for what the principled model lacks",
-            "<shape type='cube'><bsdf type='principled'><float name='clearcoat' value='1'/></bsdf></shape>",
-            "unsupported",
-        ),
-        fallback(
-            "no bumps",
-            "<shape type='cube'><bsdf type='bumpmap'><bsdf type='diffuse'/></bsdf></shape>",
-            "missing_child",
-        ),
-        fallback(
-            "the mode of u",
-            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='a b.png'/><string name='wrap_mode_v' value='clamp'/></texture></bsdf></shape>",
-            "unsupported",
-        ),
-        fallback(
-            "all channels",
-            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='a b.png'/><string name='channel' value='r'/></texture></bsdf></shape>",
-            "unsupported",
-        ),
-        fallback(
-            "all channels, for an unknown one",
-            "<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='a b.png'/><string name='channel' value='z'/></texture></bsdf></shape>",
-            "bad_value",
-        ),
-        fallback(
-            "the text of an unknown variable",
-            "<shape type='cube'><bsdf type='diffuse'><rgb name='reflectance' value='$none'/></bsdf></shape>",
-            "unknown_variable",
-        ),
-        fallback("no reference", "<shape type='cube'><ref id='nobody'/></shape>", "unknown_id"),
-        fallback("no medium", "<medium type='homogeneous'/>", "unsupported"),
-        fallback(
-            "barycentric coordinates",
-            "<shape type='obj'><string name='filename' value='plain.obj'/><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='a b.png'/></texture></bsdf></shape>",
-            "no_uv",
-        ),
+        fallback("no shape", in_cube("<transform name='to_world'><matrix value='1'/></transform>"), "bad_transform"),
+        fallback("no light", environment, "missing_file"),
+        fallback("no light", "<emitter type='point'/>".into(), "unknown_plugin"),
+        fallback("the first of two environments", "<emitter type='constant'/>".repeat(2), "unsupported"),
+        fallback("the sun 45 degrees high", "<emitter type='sky'/>".into(), "sun_by_time"),
+        fallback("the sun at the horizon", low_sun.into(), "out_of_range"),
+        fallback("radiance 1", in_cube(bright), "bad_value"),
+        fallback("the geometric mean of both", bsdf("roughconductor", anisotropic), "unsupported"),
+        fallback("0 for what the principled model lacks", clearcoat, "unsupported"),
+        fallback("no bumps", bsdf("bumpmap", "<bsdf type='diffuse'/>"), "missing_child"),
+        fallback("the mode of u", bitmap("a b.png", &string("wrap_mode_v", "clamp")), "unsupported"),
+        fallback("all channels", bitmap("a b.png", &string("channel", "r")), "unsupported"),
+        fallback("all channels, for an unknown one", bitmap("a b.png", &string("channel", "z")), "bad_value"),
+        fallback("the text of an unknown variable", color("reflectance", "$none"), "unknown_variable"),
+        fallback("no reference", in_cube("<ref id='nobody'/>"), "unknown_id"),
+        fallback("no medium", "<medium type='homogeneous'/>".into(), "unsupported"),
+        fallback("barycentric coordinates", without_uv, "no_uv"),
     ]
 }
 
 #[test]
 fn each_of_mitsuba_is_a_finding() {
     for Fallback { value, input, code } in of_mitsuba() {
-        let scene = read_inner(input);
+        let scene = read_inner(&input);
         assert!(scene.findings.iter().any(|finding| finding.code == code), "{value}: {input}: {:?}", scene.findings);
         // A colour that nobody states must not count as stated.
         if value.contains("grey") || value.contains("colour") {
