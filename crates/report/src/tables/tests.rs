@@ -7,10 +7,11 @@ use mateval_dataset::open::DatasetId;
 use mateval_dataset::{InstanceId, SceneId};
 
 use super::*;
+use crate::ranking;
 use mateval_eval::metric::{Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::key::{ResultKey, Views};
-use mateval_eval::result::{InstancePixelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId};
+use mateval_eval::result::{InstancePixelErrors, ProtocolResult};
 
 fn scene(name: &str) -> SceneId {
     SceneId::new(name).unwrap()
@@ -20,6 +21,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
     let summary: BTreeMap<ResultKey, f64> = summary.iter().map(|(key, value)| (key.parse().unwrap(), *value)).collect();
     let key = ResultKey::whole(PictureKind::RgbTrue, Views::Input, Metric::Psnr);
     let summary_noise = summary.keys().filter(|other| **other == key).map(|key| (*key, 0.016)).collect();
+    let base = ranking::tests::result(method, &[]);
     let scores = ProtocolResult {
         protocol: Protocol::named("paper").unwrap(),
         fingerprint: "f".to_owned(),
@@ -27,46 +29,10 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
         noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key, 0.25)]))]),
         summary,
         summary_noise,
-        fits: BTreeMap::new(),
-        pictures: Vec::new(),
-        texels: Vec::new(),
-        instances: Vec::new(),
-        measured: Vec::new(),
+        ..base.protocols["mateval-3"].clone()
     };
-    ResultFile {
-        format: RESULT_FORMAT.to_owned(),
-        tool: String::new(),
-        method: method.to_owned(),
-        submission: SubmissionId {
-            sha256: String::new(),
-            description: String::new(),
-            url: None,
-            licence: None,
-            cost: None,
-            trained_on: Vec::new(),
-            oracle: false,
-            geometry: None,
-        },
-        dataset: DatasetId {
-            name: String::new(),
-            version: String::new(),
-            manifest_sha256: String::new(),
-            scenes: vec![scene("b"), scene("a")],
-            total_scenes: 2,
-            wide_views: BTreeMap::new(),
-            sources: Default::default(),
-            houses: BTreeMap::new(),
-            photo_renderer: None,
-            withheld: None,
-        },
-        lpips_weights: BTreeMap::new(),
-        protocols: BTreeMap::from([("paper".to_owned(), scores)]),
-        constancy: Vec::new(),
-        not_predicted: Vec::new(),
-        tracer_check: None,
-        missing: Vec::new(),
-        findings: Vec::new(),
-    }
+    let dataset = DatasetId { scenes: vec![scene("b"), scene("a")], total_scenes: 2, ..base.dataset };
+    ResultFile { dataset, protocols: BTreeMap::from([("paper".to_owned(), scores)]), ..base }
 }
 
 /// Three methods; the second has no SSIM, none has LPIPS.
