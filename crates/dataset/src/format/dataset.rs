@@ -86,6 +86,23 @@ impl Secrecy {
 }
 
 impl DatasetFile {
+    /// A dataset of these scenes. What follows from its other files is still absent: twins, photos, licences, hash.
+    pub fn new(name: &str, version: &str, tool: &str, scenes: Vec<SceneId>) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            name: name.to_owned(),
+            version: version.to_owned(),
+            tool: tool.to_owned(),
+            scenes,
+            twins: BTreeMap::new(),
+            photo_renderer: None,
+            licences: Vec::new(),
+            geometry: None,
+            withheld: None,
+            manifest_sha256: String::new(),
+        }
+    }
+
     /// `manifest_sha256` of the dataset on which submissions made from this one are scored.
     pub fn scored_manifest_sha256(&self) -> &str {
         self.geometry.as_ref().map_or(&self.manifest_sha256, |geometry| &geometry.true_manifest_sha256)

@@ -78,19 +78,7 @@ fn finish_with(
     for id in &all {
         put_in_place(root, id, !without.contains(id))?;
     }
-    let mut dataset = DatasetFile {
-        format: FORMAT.to_owned(),
-        name: recipe.name.clone(),
-        version: recipe.version.clone(),
-        tool: tool.to_owned(),
-        scenes,
-        twins: BTreeMap::new(),
-        photo_renderer: None,
-        licences: Vec::new(),
-        geometry: None,
-        withheld: None,
-        manifest_sha256: String::new(),
-    };
+    let mut dataset = DatasetFile::new(&recipe.name, &recipe.version, tool, scenes);
     for id in &dataset.scenes {
         dataset.licences.extend(json::read::<SceneMark>(&build.mark(id))?.licence);
         dataset.licences.extend(recipe.licence_of(id));

@@ -399,19 +399,7 @@ mod tests {
     fn dataset(scenes: Vec<SceneFile>) -> Dataset {
         Dataset {
             root: "dataset".into(),
-            file: DatasetFile {
-                format: FORMAT.to_owned(),
-                name: "hand-made".to_owned(),
-                version: "1.0".to_owned(),
-                tool: String::new(),
-                scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
-                twins: BTreeMap::new(),
-                photo_renderer: None,
-                licences: Vec::new(),
-                geometry: None,
-                withheld: None,
-                manifest_sha256: String::new(),
-            },
+            file: DatasetFile::new("hand-made", "1.0", "", scenes.iter().map(|scene| scene.id.clone()).collect()),
             targets: TargetsFile { format: FORMAT.to_owned(), targets: Vec::new() },
             scenes,
             twins: Vec::new(),

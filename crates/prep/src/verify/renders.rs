@@ -175,7 +175,6 @@ pub(super) fn check_scorer(
 mod tests {
     use std::collections::BTreeMap;
 
-    use mateval_dataset::dataset::FORMAT;
     use mateval_dataset::{RendererId, manifest};
     use mateval_files::untrusted::sha256_of_bytes;
 
@@ -188,19 +187,7 @@ mod tests {
         let example = include_str!("../../../../dataset_spec/examples/scene.json");
         let scene: SceneFile = json::parse(Path::new("scene.json"), example.as_bytes()).unwrap();
         let folder = SceneFolder::of(root, &scene.id);
-        let mut dataset = DatasetFile {
-            format: FORMAT.to_owned(),
-            name: String::new(),
-            version: String::new(),
-            tool: String::new(),
-            scenes: vec![scene.id.clone()],
-            twins: BTreeMap::new(),
-            photo_renderer: None,
-            licences: Vec::new(),
-            geometry: None,
-            withheld: None,
-            manifest_sha256: String::new(),
-        };
+        let mut dataset = DatasetFile::new("", "", "", vec![scene.id.clone()]);
         let found = |dataset: &DatasetFile| {
             let mut faults = Faults::default();
             check_scorer(root, &folder, dataset, &scene, &mut faults);
