@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, score};
 use super::sample::{json, write_source};
-use mateval_testkit::kept_folder;
+use mateval_testkit::{kept_folder, npy};
 
 /// Width and height of the room's pictures, in pixels.
 const WIDTH: usize = 96;
@@ -360,17 +360,6 @@ fn texgen_files_are_exported_and_its_textures_imported() {
     run(import().arg("--force")).ends_with(2).says("living-00012.png");
 }
 
-/// A NumPy file of 64-bit integers.
-fn npy(labels: &[i64]) -> Vec<u8> {
-    let header = format!("{{'descr': '<i8', 'fortran_order': False, 'shape': ({},), }}", labels.len());
-    let padded = format!("{header:<117}\n");
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend(118_u16.to_le_bytes());
-    bytes.extend(padded.as_bytes());
-    bytes.extend(labels.iter().flat_map(|label| label.to_le_bytes()));
-    bytes
-}
-
 #[test]
 fn partfield_meshes_are_exported_and_its_labels_become_a_second_set_of_parts() {
     let (folder, dataset) = boxes();
@@ -384,7 +373,8 @@ fn partfield_meshes_are_exported_and_its_labels_become_a_second_set_of_parts() {
     assert_eq!((faces("room-00001.obj"), faces("room-00003.obj")), (12, 2));
 
     std::fs::create_dir(&clusters).unwrap();
-    std::fs::write(clusters.join("room-00001_0_03.npy"), npy(&[0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2])).unwrap();
+    std::fs::write(clusters.join("room-00001_0_03.npy"), npy(&[0_i64, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2], &[12]))
+        .unwrap();
     let labels = folder.path().join("labels");
     let import = |out: &Path| {
         let mut command = mateval();
@@ -405,7 +395,7 @@ fn partfield_meshes_are_exported_and_its_labels_become_a_second_set_of_parts() {
     run(baseline("median", &again, &out).args(words)).ends_with(0);
     assert!(is_all(&again, &out, "red", [0.8, 0.1, 0.1]));
 
-    std::fs::write(clusters.join("room-00002_0_01.npy"), npy(&[0; 11])).unwrap();
+    std::fs::write(clusters.join("room-00002_0_01.npy"), npy(&[0_i64; 11], &[11])).unwrap();
     let bad = folder.path().join("bad");
     import(&bad).ends_with(2).says("11 labels; 'green' has 12 triangles");
     std::fs::remove_dir_all(&clusters).unwrap();

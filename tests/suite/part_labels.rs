@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mateval_image::png_io;
-use npyz::WriterBuilder as _;
+use mateval_testkit::npy;
 use serde_json::Value;
 
 use super::command::{Run, build, run, verify};
@@ -29,10 +29,7 @@ impl Labelled {
 
     fn label(&self, instance: &str, labels: &[i64]) {
         let path = self.folder.path().join(format!("source/room/labels/partfield/{instance}.npy"));
-        let options = npyz::WriteOptions::new().default_dtype().shape(&[labels.len() as u64]);
-        let mut writer = options.writer(std::fs::File::create(path).unwrap()).begin_nd().unwrap();
-        writer.extend(labels.iter().copied()).unwrap();
-        writer.finish().unwrap();
+        std::fs::write(path, npy(labels, &[labels.len() as u64])).unwrap();
     }
 
     fn dataset(&self) -> PathBuf {

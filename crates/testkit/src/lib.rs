@@ -3,7 +3,7 @@
 //! [`scenes`] builds small scenes, [`bench_scene`] reads larger ones, and [`statistics`] compares their noisy renders;
 //! `sample_dataset` is the built-in sample as a dataset, with submissions for it, and [`faulty_house`] its house with
 //! a third room and faults; [`packed`] writes archives byte by byte. This file finds inputs that are not in the
-//! repository and makes folders that tests share.
+//! repository, makes folders that tests share and writes NumPy arrays.
 //!
 //! If one of these inputs is missing, the test that needs it is skipped, which is printed to stderr. With
 //! `MATEVAL_REQUIRE_DATA=1`, which CI sets, the test fails instead.
@@ -21,6 +21,7 @@ pub mod statistics;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::layout::BuildFolder;
+use npyz::WriterBuilder as _;
 
 /// The path of `file` in the shared data: in the folder that `MATEVAL_DATA` names, or in `../shared/data` from the
 /// repository's root. If it does not exist, reports this and returns none, or panics under
@@ -99,6 +100,15 @@ pub fn want_twins(root: &Path, lightings: &str) {
         .map(|line| line.replace("[[scene]]", &format!("[[scene]]\ntwins = [{lightings}]")))
         .collect();
     std::fs::write(&path, lines.join("\n")).unwrap();
+}
+
+/// The bytes of a NumPy array.
+pub fn npy<T: npyz::AutoSerialize + Copy>(numbers: &[T], shape: &[u64]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd().unwrap();
+    writer.extend(numbers.iter().copied()).unwrap();
+    writer.finish().unwrap();
+    bytes
 }
 
 /// Copies all files below `from`.

@@ -161,7 +161,7 @@ fn labels_of_instance(
 mod tests {
     use glam::Vec3;
     use mateval_dataset::TriangleMesh;
-    use npyz::WriterBuilder as _;
+    use mateval_testkit::npy;
 
     use super::*;
 
@@ -175,14 +175,6 @@ mod tests {
             mesh.triangles.push([corner, corner + 1, corner + 2]);
         }
         mesh
-    }
-
-    fn npy<T: npyz::AutoSerialize + Copy>(labels: &[T], shape: &[u64]) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd().unwrap();
-        writer.extend(labels.iter().copied()).unwrap();
-        writer.finish().unwrap();
-        bytes
     }
 
     fn parts_of(bytes: &[u8], triangles: usize) -> Result<Option<Vec<usize>>, LabelFault> {

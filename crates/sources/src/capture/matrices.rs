@@ -183,7 +183,7 @@ pub(super) fn of_lighting(file: &str, text: &str) -> Result<CapturedCamera, Inva
 mod tests {
     use std::io::Write as _;
 
-    use npyz::WriterBuilder as _;
+    use mateval_testkit::npy;
 
     use super::super::cameras::tests::{lens, pose};
     use super::*;
@@ -218,13 +218,9 @@ mod tests {
     }
 
     fn npz(name: &str, numbers: &[f64], shape: &[u64]) -> Vec<u8> {
-        let mut array = Vec::new();
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut array).begin_nd().unwrap();
-        writer.extend(numbers.iter().copied()).unwrap();
-        writer.finish().unwrap();
         let mut file = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
         file.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
-        file.write_all(&array).unwrap();
+        file.write_all(&npy(numbers, shape)).unwrap();
         file.finish().unwrap().into_inner()
     }
 

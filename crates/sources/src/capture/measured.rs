@@ -143,7 +143,7 @@ fn srgb_of_adobe(adobe: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use npyz::WriterBuilder as _;
+    use mateval_testkit::npy;
 
     use super::*;
 
@@ -188,14 +188,6 @@ mod tests {
         refused(json("[0.5,0.25,1]", ",\"standard_error\":[-1,0,0]"), "standard error is [-1.0");
         refused(b"{\"format\":\"mateval-measurements/1\",\"regions\":[]}".to_vec(), "found 0");
         refused(b"{\"format\":\"a\",\"regions\":[]}".to_vec(), "/format");
-    }
-
-    fn npy(numbers: &[f64], shape: &[u64]) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd().unwrap();
-        writer.extend(numbers.iter().copied()).unwrap();
-        writer.finish().unwrap();
-        bytes
     }
 
     /// White is white in both spaces, to the rounding of the matrices; Adobe's green lies outside of sRGB. The third by

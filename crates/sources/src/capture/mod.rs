@@ -425,7 +425,7 @@ impl Invalid {
 
 #[cfg(test)]
 mod tests {
-    use npyz::WriterBuilder as _;
+    use mateval_testkit::npy;
     use proptest::prelude::*;
 
     use super::*;
@@ -490,12 +490,7 @@ mod tests {
         assert!((areas[0] - 4.0).abs() < 1e-6 && (areas[1] - 1.0).abs() < 1e-6);
         assert!(pieces.read.findings.iter().any(|finding| finding.code == "small_pieces"));
         let labels = |labels: &[i64]| {
-            let mut bytes = Vec::new();
-            let options = npyz::WriteOptions::new().default_dtype().shape(&[labels.len() as u64]);
-            let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
-            writer.extend(labels.iter().copied()).unwrap();
-            writer.finish().unwrap();
-            std::fs::write(folder.path().join("labels.npy"), bytes).unwrap();
+            std::fs::write(folder.path().join("labels.npy"), npy(labels, &[labels.len() as u64])).unwrap();
             read(&CaptureFiles { labels: Some("labels.npy".to_owned()), ..files.clone() })
         };
         assert_eq!(names(&labels(&[7, 7, -1, -1, 7]).unwrap()), ["label_-1", "label_7"]);
