@@ -1,7 +1,11 @@
 //! The tables and their columns, and the numbers that cells can hold.
 
+use mateval_eval::metric::PictureKind::{
+    Albedo, AlbedoAligned, Metallic, RgbFitted, RgbRelit, RgbTrue, Roughness, TextureBaseColor,
+};
 use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
 use mateval_eval::result::constancy::{Constancy, ConstancyMeans};
+use mateval_eval::result::key::Views::{Input, Novel, Observed, Unobserved, Wide, WideUnobserved};
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 
 use crate::titles::Titled;
@@ -56,9 +60,9 @@ impl ConstancyNumber {
 
 /// The columns of constancy: title, whether answers are aligned, and numbers.
 const CONSTANCY: [(&str, PictureKind, &[ConstancyNumber]); 3] = [
-    ("Deviation", PictureKind::TextureBaseColor, &ConstancyNumber::DEVIATIONS),
-    ("Aligned deviation", PictureKind::AlbedoAligned, &ConstancyNumber::DEVIATIONS),
-    ("Mean answer", PictureKind::TextureBaseColor, &ConstancyNumber::ACCURACY),
+    ("Deviation", TextureBaseColor, &ConstancyNumber::DEVIATIONS),
+    ("Aligned deviation", AlbedoAligned, &ConstancyNumber::DEVIATIONS),
+    ("Mean answer", TextureBaseColor, &ConstancyNumber::ACCURACY),
 ];
 
 /// The numbers of constancy, as the cells of [`constancy`] name them.
@@ -66,17 +70,17 @@ pub(super) fn constancy_values(families: &[Constancy]) -> Vec<(CellKey, f64)> {
     let Some(means) = ConstancyMeans::of(families) else { return Vec::new() };
     let cell = |kind, number| CellKey {
         picture: PictureName::whole(kind),
-        views: Views::Observed,
+        views: Observed,
         quantity: Quantity::Constancy(number),
     };
     let mut values = Vec::new();
-    for (at, kind) in [PictureKind::TextureBaseColor, PictureKind::AlbedoAligned].into_iter().enumerate() {
+    for (at, kind) in [TextureBaseColor, AlbedoAligned].into_iter().enumerate() {
         values.extend(means.relative[at].map(|value| (cell(kind, ConstancyNumber::Relative), value)));
         values.push((cell(kind, ConstancyNumber::Linear), means.linear[at]));
         values.push((cell(kind, ConstancyNumber::DeltaE), means.delta_e[at]));
     }
-    values.push((cell(PictureKind::TextureBaseColor, ConstancyNumber::MeanPsnr), means.mean_psnr));
-    values.push((cell(PictureKind::TextureBaseColor, ConstancyNumber::MeanDeltaE), means.mean_delta_e));
+    values.push((cell(TextureBaseColor, ConstancyNumber::MeanPsnr), means.mean_psnr));
+    values.push((cell(TextureBaseColor, ConstancyNumber::MeanDeltaE), means.mean_delta_e));
     values
 }
 
@@ -85,7 +89,7 @@ fn constancy() -> Layout {
     let block = |(title, kind, numbers): (&'static str, PictureKind, &[ConstancyNumber])| Block {
         title,
         picture: PictureName::whole(kind),
-        views: Views::Observed,
+        views: Observed,
         quantities: numbers.iter().map(|number| Quantity::Constancy(*number)).collect(),
     };
     Layout { title: "Constancy of base colour over light".to_owned(), blocks: CONSTANCY.map(block).into() }
@@ -162,67 +166,33 @@ pub(crate) type TableWords = (&'static str, &'static [BlockWords]);
 
 /// The paper's Tables II to V in its order.
 pub(crate) const PAPER: [TableWords; 4] = [
-    (
-        "RGB, fitted light",
-        &[("Input view", PictureKind::RgbFitted, Views::Input), ("Novel views", PictureKind::RgbFitted, Views::Novel)],
-    ),
-    (
-        "Albedo, input view",
-        &[("Albedo", PictureKind::Albedo, Views::Input), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Input)],
-    ),
-    (
-        "Albedo, novel views",
-        &[("Albedo", PictureKind::Albedo, Views::Novel), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Novel)],
-    ),
-    ("Aligned albedo, unobserved regions", &[("Aligned albedo", PictureKind::AlbedoAligned, Views::Unobserved)]),
+    ("RGB, fitted light", &[("Input view", RgbFitted, Input), ("Novel views", RgbFitted, Novel)]),
+    ("Albedo, input view", &[("Albedo", Albedo, Input), ("Aligned albedo", AlbedoAligned, Input)]),
+    ("Albedo, novel views", &[("Albedo", Albedo, Novel), ("Aligned albedo", AlbedoAligned, Novel)]),
+    ("Aligned albedo, unobserved regions", &[("Aligned albedo", AlbedoAligned, Unobserved)]),
 ];
 
 /// The tables that the paper does not have.
 const OURS: [TableWords; 7] = [
-    ("Albedo, unobserved regions", &[("Albedo", PictureKind::Albedo, Views::Unobserved)]),
-    (
-        "RGB, true light",
-        &[("Input view", PictureKind::RgbTrue, Views::Input), ("Novel views", PictureKind::RgbTrue, Views::Novel)],
-    ),
-    (
-        "RGB, relit",
-        &[("Input view", PictureKind::RgbRelit, Views::Input), ("Novel views", PictureKind::RgbRelit, Views::Novel)],
-    ),
-    (
-        "Roughness and metallic, input view",
-        &[("Roughness", PictureKind::Roughness, Views::Input), ("Metallic", PictureKind::Metallic, Views::Input)],
-    ),
-    (
-        "Roughness and metallic, novel views",
-        &[("Roughness", PictureKind::Roughness, Views::Novel), ("Metallic", PictureKind::Metallic, Views::Novel)],
-    ),
-    (
-        "Albedo, wide views",
-        &[
-            ("Wide views", PictureKind::Albedo, Views::Wide),
-            ("Unobserved in wide views", PictureKind::Albedo, Views::WideUnobserved),
-        ],
-    ),
+    ("Albedo, unobserved regions", &[("Albedo", Albedo, Unobserved)]),
+    ("RGB, true light", &[("Input view", RgbTrue, Input), ("Novel views", RgbTrue, Novel)]),
+    ("RGB, relit", &[("Input view", RgbRelit, Input), ("Novel views", RgbRelit, Novel)]),
+    ("Roughness and metallic, input view", &[("Roughness", Roughness, Input), ("Metallic", Metallic, Input)]),
+    ("Roughness and metallic, novel views", &[("Roughness", Roughness, Novel), ("Metallic", Metallic, Novel)]),
+    ("Albedo, wide views", &[("Wide views", Albedo, Wide), ("Unobserved in wide views", Albedo, WideUnobserved)]),
     (
         "RGB, true light, wide views",
-        &[
-            ("Wide views", PictureKind::RgbTrue, Views::Wide),
-            ("Unobserved in wide views", PictureKind::RgbTrue, Views::WideUnobserved),
-        ],
+        &[("Wide views", RgbTrue, Wide), ("Unobserved in wide views", RgbTrue, WideUnobserved)],
     ),
 ];
 
 const TEXTURE_SPACE: TableWords = (
     "Base colour, texture space",
-    &[
-        ("Observed", PictureKind::TextureBaseColor, Views::Observed),
-        ("Unobserved", PictureKind::TextureBaseColor, Views::Unobserved),
-    ],
+    &[("Observed", TextureBaseColor, Observed), ("Unobserved", TextureBaseColor, Unobserved)],
 );
 
 /// Pictures whose errors are pooled over instances.
-const POOLED_PICTURES: [PictureKind; 4] =
-    [PictureKind::Albedo, PictureKind::AlbedoAligned, PictureKind::RgbTrue, PictureKind::RgbFitted];
+const POOLED_PICTURES: [PictureKind; 4] = [Albedo, AlbedoAligned, RgbTrue, RgbFitted];
 
 /// The tables of scores: the paper's, ours, those of pictures that have no table among these, and ours again over
 /// specular regions.
@@ -231,7 +201,7 @@ pub(super) fn all() -> Vec<Layout> {
     let is_listed = |kind: PictureKind| listed().any(|(_, blocks)| blocks.iter().any(|(_, known, _)| *known == kind));
     let others = PictureKind::ALL.iter().copied().filter(|kind| !is_listed(*kind));
     let other = |kind: PictureKind| {
-        let blocks = [("Input view", kind, Views::Input), ("Novel views", kind, Views::Novel)];
+        let blocks = [("Input view", kind, Input), ("Novel views", kind, Novel)];
         layout(kind.title().to_owned(), &blocks, Surfaces::All)
     };
     let plain = listed().map(|(title, blocks)| layout(title.to_owned(), blocks, Surfaces::All));
@@ -243,12 +213,12 @@ pub(super) fn all() -> Vec<Layout> {
 }
 
 const HEADLINE: [BlockWords; 6] = [
-    ("Albedo, input view", PictureKind::Albedo, Views::Input),
-    ("Albedo, novel views", PictureKind::Albedo, Views::Novel),
-    ("True light, input view", PictureKind::RgbTrue, Views::Input),
-    ("True light, novel views", PictureKind::RgbTrue, Views::Novel),
-    ("Relit, input view", PictureKind::RgbRelit, Views::Input),
-    ("Relit, novel views", PictureKind::RgbRelit, Views::Novel),
+    ("Albedo, input view", Albedo, Input),
+    ("Albedo, novel views", Albedo, Novel),
+    ("True light, input view", RgbTrue, Input),
+    ("True light, novel views", RgbTrue, Novel),
+    ("Relit, input view", RgbRelit, Input),
+    ("Relit, novel views", RgbRelit, Novel),
 ];
 
 /// One table of what matters most.
@@ -270,7 +240,7 @@ fn layout(title: String, blocks: &[BlockWords], surfaces: Surfaces) -> Layout {
 
 /// The tables of errors that are pooled over the pixels of instances.
 pub(super) fn pooled() -> Vec<Layout> {
-    let views = [Views::Input, Views::Novel, Views::Unobserved];
+    let views = [Input, Novel, Unobserved];
     let block = |kind, views: Views| Block {
         title: views.title(),
         picture: PictureName::whole(kind),
