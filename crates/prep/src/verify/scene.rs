@@ -135,51 +135,33 @@ fn check_place(view: &View, input: &Camera, at: usize, faults: &mut Faults) {
 }
 
 fn check_numbers(scene: &SceneFile, faults: &mut Faults) {
-    let mut ids = BTreeSet::new();
-    for (at, instance) in scene.instances.iter().enumerate() {
-        if usize::from(instance.index.0.get()) != at + 1 {
-            faults.add("bad_index", SCENE_FILE, format!("/instances/{at}/index"), format!("expected {}", at + 1));
-        }
-        if !ids.insert(&instance.id) {
-            faults.add(
-                "duplicate_id",
-                SCENE_FILE,
-                format!("/instances/{at}/id"),
-                format!("'{}' is listed twice", instance.id),
-            );
-        }
-    }
+    let instances = scene.instances.iter().map(|instance| (Some(instance.index.0.get()), instance.id.as_str()));
+    check_ids("/instances", instances, faults);
     check_parts(scene, &scene.parts, "/parts", faults);
-    let mut sets = BTreeSet::new();
+    check_ids("/part_sets", scene.part_sets.iter().map(|set| (None, set.id.as_str())), faults);
     for (at, set) in scene.part_sets.iter().enumerate() {
-        if !sets.insert(&set.id) {
-            faults.add(
-                "duplicate_id",
-                SCENE_FILE,
-                format!("/part_sets/{at}/id"),
-                format!("'{}' is listed twice", set.id),
-            );
-        }
         check_parts(scene, &set.parts, &format!("/part_sets/{at}/parts"), faults);
+    }
+}
+
+/// Checks that the ids of the list at `pointer` differ, and that its indices, where it has them, count from 1.
+fn check_ids<'a>(pointer: &str, items: impl Iterator<Item = (Option<u16>, &'a str)>, faults: &mut Faults) {
+    let mut ids = BTreeSet::new();
+    for (at, (index, id)) in items.enumerate() {
+        if index.is_some_and(|index| usize::from(index) != at + 1) {
+            faults.add("bad_index", SCENE_FILE, format!("{pointer}/{at}/index"), format!("expected {}", at + 1));
+        }
+        if !ids.insert(id) {
+            faults.add("duplicate_id", SCENE_FILE, format!("{pointer}/{at}/id"), format!("'{id}' is listed twice"));
+        }
     }
 }
 
 /// Checks one set of parts, whose JSON pointer is `pointer`.
 fn check_parts(scene: &SceneFile, parts: &[Part], pointer: &str, faults: &mut Faults) {
+    check_ids(pointer, parts.iter().map(|part| (Some(part.index.0.get()), part.id.as_str())), faults);
     let instances: BTreeSet<_> = scene.instances.iter().map(|instance| &instance.id).collect();
-    let mut ids = BTreeSet::new();
     for (at, part) in parts.iter().enumerate() {
-        if usize::from(part.index.0.get()) != at + 1 {
-            faults.add("bad_index", SCENE_FILE, format!("{pointer}/{at}/index"), format!("expected {}", at + 1));
-        }
-        if !ids.insert(&part.id) {
-            faults.add(
-                "duplicate_id",
-                SCENE_FILE,
-                format!("{pointer}/{at}/id"),
-                format!("'{}' is listed twice", part.id),
-            );
-        }
         if !instances.contains(&part.instance) {
             let message = format!("the scene has no instance '{}'", part.instance);
             faults.add("dangling_reference", SCENE_FILE, format!("{pointer}/{at}/instance"), message);
