@@ -58,7 +58,7 @@ pub fn check_output_file(path: &Path, flag: &str, kind: &str, force: bool) -> an
 pub struct Places {
     /// Folder of the dataset.
     #[arg(long)]
-    dataset: PathBuf,
+    pub dataset: PathBuf,
     /// Folder of the submission.
     #[arg(long)]
     pub out: PathBuf,
@@ -72,23 +72,13 @@ pub struct Places {
 pub struct ExportPlaces {
     /// Folder of the dataset.
     #[arg(long)]
-    dataset: PathBuf,
+    pub dataset: PathBuf,
     /// Folder for the files; must not exist yet.
     #[arg(long)]
     pub out: PathBuf,
 }
 
 impl Places {
-    /// Opens the dataset as methods see it.
-    pub fn open(&self) -> anyhow::Result<Dataset> {
-        Ok(open_dataset(&self.dataset)?.with_twins())
-    }
-
-    /// Opens the dataset, and says which of the estimate's files are read for it, and what may be wrong with them.
-    pub fn open_for(&self, source: &EstimateSource) -> anyhow::Result<Dataset> {
-        open_for(&self.dataset, source)
-    }
-
     /// Prints where the submission is and how many instances it covers.
     pub fn done(&self, instances: usize) -> anyhow::Result<Outcome> {
         print(&format!("{}: {}\n", self.out.display(), counted(instances, "instance")))?;
@@ -96,20 +86,14 @@ impl Places {
     }
 }
 
-impl ExportPlaces {
-    /// Opens the dataset as methods see it.
-    pub fn open(&self) -> anyhow::Result<Dataset> {
-        Ok(open_dataset(&self.dataset)?.with_twins())
-    }
-
-    /// Opens the dataset, and says which of the estimate's files are read for it, and what may be wrong with them.
-    pub fn open_for(&self, source: &EstimateSource) -> anyhow::Result<Dataset> {
-        open_for(&self.dataset, source)
-    }
+/// Opens the dataset in `root` as methods see it.
+pub fn open_with_twins(root: &Path) -> anyhow::Result<Dataset> {
+    Ok(open_dataset(root)?.with_twins())
 }
 
-fn open_for(dataset: &Path, source: &EstimateSource) -> anyhow::Result<Dataset> {
-    let dataset = open_dataset(dataset)?.with_twins();
+/// Opens the dataset in `root`, and says which of the estimate's files are read for it and what may be wrong with them.
+pub fn open_for(root: &Path, source: &EstimateSource) -> anyhow::Result<Dataset> {
+    let dataset = open_with_twins(root)?;
     if let Some(text) = source.files_read(&dataset) {
         say(&text);
     }

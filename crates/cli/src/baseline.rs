@@ -18,7 +18,7 @@ use mateval_baselines::submission::Baseline;
 use mateval_baselines::{BASELINES, bridges};
 use mateval_dataset::PartSetId;
 
-use crate::arguments::{EstimateArgs, ExportPlaces, Places, word_parser};
+use crate::arguments::{EstimateArgs, ExportPlaces, Places, open_for, open_with_twins, word_parser};
 use crate::terminal::{Outcome, counted, print, with_progress};
 
 /// Subcommands of `baseline`, one per method.
@@ -125,12 +125,12 @@ impl FromArgMatches for WithoutOptions {
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::WithoutOptions(WithoutOptions { baseline, places }) => {
-            places.done((baseline.write)(&places.open()?, &places.out, places.force)?)
+            places.done((baseline.write)(&open_with_twins(&places.dataset)?, &places.out, places.force)?)
         }
         Command::Nn(args) => nearest_neighbours(args),
         Command::Median(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
-            let dataset = places.open_for(&source)?;
+            let dataset = open_for(&places.dataset, &source)?;
             let of = if args.parts { MedianOf::Parts(args.part_set.as_ref()) } else { MedianOf::Instances };
             places.done(with_progress(|progress| {
                 median::write(&dataset, &places.out, places.force, &source, of, progress)
@@ -154,7 +154,7 @@ fn nearest_neighbours(args: &NnArgs) -> anyhow::Result<Outcome> {
     }
     let rule = FillRule { neighbours: args.neighbours.into(), normal_weight_m: args.normal_weight };
     let options = NnOptions { rule, any_instance: args.any_instance, atlas_size: args.atlas_size };
-    let dataset = places.open_for(&source)?;
+    let dataset = open_for(&places.dataset, &source)?;
     places.done(with_progress(|progress| nn::write(&dataset, &places.out, places.force, &source, &options, progress))?)
 }
 
@@ -179,7 +179,7 @@ fn shown_lights(lights: &CandidateLights) -> (&'static str, &'static str) {
 
 impl DelightArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let dataset = self.places.open()?;
+        let dataset = open_with_twins(&self.places.dataset)?;
         let options = DelightOptions { lights: self.lights, ..DelightOptions::default() };
         let out = &self.places.out;
         let count = with_progress(|progress| delight::write(&dataset, out, &options, progress))?;
@@ -242,7 +242,7 @@ impl ProceduralArgs {
             detail: self.detail,
             graphs: self.graphs.clone(),
         };
-        let (places, dataset) = (&self.places, self.places.open_for(&source)?);
+        let (places, dataset) = (&self.places, open_for(&self.places.dataset, &source)?);
         let instances = with_progress(|progress| {
             procedural::write(&dataset, &places.out, places.force, &source, &options, progress)
         })?;
@@ -272,7 +272,7 @@ pub struct TexgenImportArgs {
 impl TexgenExportArgs {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         let source = self.estimate.source(EstimateSource::Truth)?;
-        let dataset = self.places.open_for(&source)?;
+        let dataset = open_for(&self.places.dataset, &source)?;
         let count = with_progress(|progress| bridges::export_texgen(&dataset, &self.places.out, &source, progress))?;
         print(&format!("{}: {count} objects\n", self.places.out.display()))?;
         Ok(Outcome::Good)
@@ -286,7 +286,7 @@ impl TexgenImportArgs {
             bail!("texgen-import needs --estimate, the same as texgen-export had: seen texels are taken from it");
         }
         let (places, source) = (&self.places, self.estimate.source(EstimateSource::Truth)?);
-        let dataset = places.open_for(&source)?;
+        let dataset = open_for(&places.dataset, &source)?;
         let (instances, textured) = with_progress(|progress| {
             bridges::import_texgen(&dataset, &self.results, &places.out, places.force, &source, progress)
         })?;
@@ -307,7 +307,7 @@ pub struct PartfieldImportArgs {
 }
 
 fn partfield_export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
-    let count = bridges::export_partfield(&places.open()?, &places.out)?;
+    let count = bridges::export_partfield(&open_with_twins(&places.dataset)?, &places.out)?;
     print(&format!("{}: {count} mesh{}\n", places.out.display(), if count == 1 { "" } else { "es" }))?;
     Ok(Outcome::Good)
 }
@@ -315,7 +315,8 @@ fn partfield_export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
 impl PartfieldImportArgs {
     /// Copies the labels to where a recipe expects them.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let count = bridges::import_partfield(&self.places.open()?, &self.clusters, self.parts, &self.places.out)?;
+        let dataset = open_with_twins(&self.places.dataset)?;
+        let count = bridges::import_partfield(&dataset, &self.clusters, self.parts, &self.places.out)?;
         print(&format!("{}: labels of {}\n", self.places.out.display(), counted(count, "instance")))?;
         Ok(Outcome::Good)
     }

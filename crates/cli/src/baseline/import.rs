@@ -9,7 +9,7 @@ use mateval_baselines::submission::Method;
 use mateval_dataset::material::MaterialParameter;
 use mateval_dataset::{PartSetId, json};
 
-use crate::arguments::{Format, Places};
+use crate::arguments::{Format, Places, open_with_twins};
 use crate::terminal::{Outcome, print, say, with_progress};
 
 #[derive(clap::Args)]
@@ -47,7 +47,7 @@ impl ImportArgs {
             self.method
         );
         let (places, method) = (&self.places, Method::new(&self.method, &description));
-        let dataset = places.open()?;
+        let dataset = open_with_twins(&places.dataset)?;
         let report = with_progress(|progress| {
             import::write(&dataset, &self.folder, &places.out, places.force, &method, &options, progress)
         })?;
