@@ -62,15 +62,13 @@ pub struct ObjGroup {
 /// A mesh in the file's own space, and what was left out of it.
 #[derive(Debug)]
 pub struct ObjMesh {
-    /// The triangles of all groups, group by group, relative to `base`.
+    /// The triangles, group by group, relative to `base`. Where only some corners have a uv, that of the others is NaN.
     pub mesh: TriangleMesh,
     /// What has been subtracted from the positions: whole units where the first of them is more than 1000 from the
     /// origin, else nothing.
     pub base: DVec3,
     /// Its objects and groups in their order.
     pub groups: Vec<ObjGroup>,
-    /// Corners without texture coordinates where others have them; their uv is NaN.
-    pub corners_without_uv: usize,
     /// Corners without normals where others have them; their normals are NaN.
     pub corners_without_normal: usize,
     /// The colour of each vertex (`v x y z r g b`) as the file has it; empty where no vertex has one.
@@ -138,13 +136,13 @@ pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<Obj
     let base = base(&text);
     let text = if base == DVec3::ZERO { text } else { Cow::Owned(relative_to(&text, base)) };
     let missing = |with: usize| if with == 0 { 0 } else { census.corners - with };
-    let (without_uv, without_normal) = (missing(census.corners_with_uv), missing(census.corners_with_normal));
-    let read = if without_uv > 0 || without_normal > 0 {
-        load(&with_all_indices(&text, without_uv > 0, without_normal > 0), materials)?
+    let (lacks_uv, without_normal) = (missing(census.corners_with_uv) > 0, missing(census.corners_with_normal));
+    let read = if lacks_uv || without_normal > 0 {
+        load(&with_all_indices(&text, lacks_uv, without_normal > 0), materials)?
     } else {
         load(&text, materials)?
     };
-    Ok(ObjMesh { base, corners_without_uv: without_uv, corners_without_normal: without_normal, ..read })
+    Ok(ObjMesh { base, corners_without_normal: without_normal, ..read })
 }
 
 /// The position of a line `v x y z ...`; none of any other line.
@@ -412,7 +410,7 @@ fn load(text: &str, materials: Materials) -> Result<ObjMesh, ObjError> {
     mesh.normals = mesh.normals.filter(|normals| normals.len() == count);
     // tobj has the colours of a group where each of its vertices has one.
     colors.truncate(if colors.len() == count { count } else { 0 });
-    Ok(ObjMesh { mesh, base: DVec3::ZERO, groups, colors, corners_without_uv: 0, corners_without_normal: 0 })
+    Ok(ObjMesh { mesh, base: DVec3::ZERO, groups, colors, corners_without_normal: 0 })
 }
 
 fn without_material_files(text: &str) -> String {
@@ -514,14 +512,16 @@ mod tests {
     fn faces_without_uv_are_marked_and_others_keep_theirs() {
         for with_uv in ["f 1/1/1 2/2/1 3/3/1", "f -4/-4/-1 -3/-3/-1 -2/-2/-1"] {
             let read = read_text(&format!("{with_uv}\nf 1//1 3//1 4//1")).unwrap();
-            assert_eq!((read.corners_without_uv, read.corners_without_normal, read.mesh.triangles.len()), (3, 0, 2));
+            assert_eq!((read.corners_without_normal, read.mesh.triangles.len()), (0, 2));
             let uvs = read.mesh.uvs.unwrap();
             assert_eq!(uvs[read.mesh.triangles[0][2] as usize], Vec2::ONE);
-            assert!(read.mesh.triangles[1].iter().all(|vertex| uvs[*vertex as usize].is_nan()));
+            let is_without = |vertex: &u32| uvs[*vertex as usize].is_nan();
+            let marked: Vec<bool> = read.mesh.triangles.as_flattened().iter().map(is_without).collect();
+            assert_eq!(marked, [false, false, false, true, true, true]);
             assert!(read.mesh.normals.unwrap().iter().all(|normal| *normal == Vec3::Z));
         }
         let read = read_text("f 1//1 2//1 3//1\nf 1 3 4").unwrap();
-        assert_eq!((read.corners_without_uv, read.corners_without_normal, read.mesh.uvs), (0, 3, None));
+        assert_eq!((read.corners_without_normal, read.mesh.uvs), (3, None));
         let normals = read.mesh.normals.unwrap();
         assert!(read.mesh.triangles[1].iter().all(|vertex| normals[*vertex as usize].is_nan()));
     }
