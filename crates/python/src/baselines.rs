@@ -219,20 +219,12 @@ pub fn procedural<'py>(
     let options = ProceduralOptions { part_set, keep_seen, detail, ..ProceduralOptions::default() };
     options.check().map_err(|fault| PyValueError::new_err(fault.to_string()))?;
     let source = Arc::clone(&scene.source);
-    let all = run_long(py, &listener, move |progress| procedural_maps(&source, &estimate, &options, progress))?;
+    let all = run_long(py, &listener, move |progress| -> Result<BTreeMap<usize, MadeMaps>, BaselineError> {
+        let geometry = SceneGeometry::read(source.folder(), source.file())?;
+        let all = scene_maps(&geometry, &estimate, &options, progress)?.into_iter();
+        Ok(all.map(|(instance, baked)| (instance, MadeMaps { maps: baked.maps, seen: baked.seen })).collect())
+    })?;
     by_id(py, scene, all.map_err(failed)?)
-}
-
-/// The maps by the instance's place in the scene.
-fn procedural_maps(
-    source: &SceneSource,
-    estimate: &Estimate,
-    options: &ProceduralOptions,
-    progress: Progress<'_>,
-) -> Result<BTreeMap<usize, MadeMaps>, BaselineError> {
-    let geometry = SceneGeometry::read(source.folder(), source.file())?;
-    let all = scene_maps(&geometry, estimate, options, progress)?.into_iter();
-    Ok(all.map(|(instance, baked)| (instance, MadeMaps { maps: baked.maps, seen: baked.seen })).collect())
 }
 
 /// A photo without its light. Its pictures are those of the input view.

@@ -15,7 +15,7 @@ pub mod text;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_dataset::dataset::{Instance, SceneFile};
+use mateval_dataset::dataset::Instance;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, Progress, Report, SceneId, ViewId};
 use mateval_eval::metric::{Metric, PictureKind};
@@ -100,7 +100,13 @@ pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explana
     let found: Vec<(u16, Explained)> =
         patches.par_iter().map(|(index, patches)| (*index, explained(patches))).collect();
     let whole = Explained::sum(found.iter().map(|(_, explained)| explained));
-    let instances = worst_first(scene, &ids, &found, &whole);
+    // The instance with the largest share first.
+    let explanation = |(index, found): &(u16, Explained)| {
+        let instance = scene.instances.iter().find(|instance| instance.index.0.get() == *index)?;
+        Some((*index, instance_explanation(&ids, instance, found, &whole)))
+    };
+    let mut instances: Vec<(u16, InstanceExplanation)> = found.iter().filter_map(explanation).collect();
+    instances.sort_by(|(_, a), (_, b)| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
     let worst = instances.iter().filter(|(_, i)| i.mse > 0.0).take(WORST).map(|(index, _)| *index).collect();
     let named = |source| ReportError::Metric { what: format!("scene '{}'", scene.id), source };
     let file = ExplainFile {
@@ -126,22 +132,6 @@ pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explana
     check_scores(scores, &file)?;
     progress(Report::step("kinds of error", 2, 2));
     Ok(Explanation { file, views, patches, worst })
-}
-
-/// The explanation of each instance with its index, the one with the largest share first.
-fn worst_first(
-    scene: &SceneFile,
-    views: &[ViewId],
-    found: &[(u16, Explained)],
-    whole: &Explained,
-) -> Vec<(u16, InstanceExplanation)> {
-    let explanation = |(index, found): &(u16, Explained)| {
-        let instance = scene.instances.iter().find(|instance| instance.index.0.get() == *index)?;
-        Some((*index, instance_explanation(views, instance, found, whole)))
-    };
-    let mut instances: Vec<(u16, InstanceExplanation)> = found.iter().filter_map(explanation).collect();
-    instances.sort_by(|(_, a), (_, b)| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
-    instances
 }
 
 fn instance_explanation(
