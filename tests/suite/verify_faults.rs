@@ -20,6 +20,10 @@ struct Fault {
     plant: fn(&Path),
 }
 
+fn fault(what: &'static str, code: &'static str, file: &'static str, plant: fn(&Path)) -> Fault {
+    Fault { what, expected: (code, file), plant }
+}
+
 fn findings(run: &Run) -> Vec<(String, String)> {
     let found: Value = serde_json::from_str(&run.stdout).unwrap();
     let text = |value: &Value| value.as_str().unwrap().to_owned();
@@ -68,34 +72,22 @@ fn sound_datasets_pass() {
 #[test]
 fn hashes() {
     let faults = [
-        Fault {
-            what: "a changed byte",
-            expected: ("changed_file", "scenes/room/views/input/depth.exr"),
-            plant: |root| {
-                let path = Room::of(root).file("views/input/depth.exr");
-                let mut bytes = std::fs::read(&path).unwrap();
-                *bytes.last_mut().unwrap() ^= 1;
-                std::fs::write(path, bytes).unwrap();
-            },
-        },
-        Fault {
-            what: "a missing file",
-            expected: ("missing_file", "scenes/room/views/up_left/part.png"),
-            plant: |root| std::fs::remove_file(Room::of(root).file("views/up_left/part.png")).unwrap(),
-        },
-        Fault {
-            what: "an unlisted file",
-            expected: ("unlisted_file", "scenes/room/notes.txt"),
-            plant: |root| std::fs::write(Room::of(root).file("notes.txt"), "x").unwrap(),
-        },
-        Fault {
-            what: "a line removed from the manifest",
-            expected: ("wrong_manifest", "dataset.json"),
-            plant: |root| {
-                let text = super::sample::manifest(root);
-                std::fs::write(root.join("MANIFEST.sha256"), text.split_once('\n').unwrap().1).unwrap();
-            },
-        },
+        fault("a changed byte", "changed_file", "scenes/room/views/input/depth.exr", |root| {
+            let path = Room::of(root).file("views/input/depth.exr");
+            let mut bytes = std::fs::read(&path).unwrap();
+            *bytes.last_mut().unwrap() ^= 1;
+            std::fs::write(path, bytes).unwrap();
+        }),
+        fault("a missing file", "missing_file", "scenes/room/views/up_left/part.png", |root| {
+            std::fs::remove_file(Room::of(root).file("views/up_left/part.png")).unwrap()
+        }),
+        fault("an unlisted file", "unlisted_file", "scenes/room/notes.txt", |root| {
+            std::fs::write(Room::of(root).file("notes.txt"), "x").unwrap()
+        }),
+        fault("a line removed from the manifest", "wrong_manifest", "dataset.json", |root| {
+            let text = super::sample::manifest(root);
+            std::fs::write(root.join("MANIFEST.sha256"), text.split_once('\n').unwrap().1).unwrap();
+        }),
     ];
     check_all(&faults, false, 4);
 }
@@ -103,45 +95,27 @@ fn hashes() {
 #[test]
 fn json_files() {
     let faults = [
-        Fault {
-            what: "a string for a number",
-            expected: ("breaks_schema", "scenes/room/scene.json"),
-            plant: |root| Room::of(root).edit_scene(|scene| scene["exposure"] = Value::from("1")),
-        },
-        Fault {
-            what: "an unknown key",
-            expected: ("breaks_schema", "targets.json"),
-            plant: |root| edit_json(&root.join("targets.json"), |file| file["target"] = Value::from(1)),
-        },
-        Fault {
-            what: "a target that names a missing view",
-            expected: ("dangling_reference", "targets.json"),
-            plant: |root| {
-                edit_json(&root.join("targets.json"), |file| file["targets"][1]["view"] = "upside_down".into())
-            },
-        },
-        Fault {
-            what: "a duplicate target",
-            expected: ("duplicate_target", "targets.json"),
-            plant: |root| {
-                edit_json(&root.join("targets.json"), |file| file["targets"][1] = file["targets"][0].clone());
-            },
-        },
-        Fault {
-            what: "a part of an instance that does not exist",
-            expected: ("dangling_reference", "scenes/room/scene.json"),
-            plant: |root| Room::of(root).edit_scene(|scene| scene["parts"][0]["instance"] = "nobody".into()),
-        },
-        Fault {
-            what: "another version with other keys",
-            expected: ("wrong_format", "scenes/room/scene.json"),
-            plant: |root| {
-                Room::of(root).edit_scene(|scene| {
-                    scene["format"] = "mateval/9".into();
-                    scene["novelty"] = 1.into();
-                });
-            },
-        },
+        fault("a string for a number", "breaks_schema", "scenes/room/scene.json", |root| {
+            Room::of(root).edit_scene(|scene| scene["exposure"] = Value::from("1"))
+        }),
+        fault("an unknown key", "breaks_schema", "targets.json", |root| {
+            edit_json(&root.join("targets.json"), |file| file["target"] = Value::from(1))
+        }),
+        fault("a target that names a missing view", "dangling_reference", "targets.json", |root| {
+            edit_json(&root.join("targets.json"), |file| file["targets"][1]["view"] = "upside_down".into())
+        }),
+        fault("a duplicate target", "duplicate_target", "targets.json", |root| {
+            edit_json(&root.join("targets.json"), |file| file["targets"][1] = file["targets"][0].clone());
+        }),
+        fault("a part of an instance that does not exist", "dangling_reference", "scenes/room/scene.json", |root| {
+            Room::of(root).edit_scene(|scene| scene["parts"][0]["instance"] = "nobody".into())
+        }),
+        fault("another version with other keys", "wrong_format", "scenes/room/scene.json", |root| {
+            Room::of(root).edit_scene(|scene| {
+                scene["format"] = "mateval/9".into();
+                scene["novelty"] = 1.into();
+            });
+        }),
     ];
     check_all(&faults, true, 6);
 }
@@ -149,15 +123,14 @@ fn json_files() {
 #[test]
 fn cameras() {
     let faults = [
-        Fault {
-            what: "one view's camera rolled",
-            expected: ("bad_camera", "scenes/room/scene.json"),
-            plant: |root| Room::of(root).edit_scene(|scene| roll(&mut scene["views"][1], 3.0)),
-        },
-        Fault {
-            what: "all cameras rolled together: each is still the turned input camera",
-            expected: ("not_reprojected", "scenes/room/views/input/instance.png"),
-            plant: |root| {
+        fault("one view's camera rolled", "bad_camera", "scenes/room/scene.json", |root| {
+            Room::of(root).edit_scene(|scene| roll(&mut scene["views"][1], 3.0))
+        }),
+        fault(
+            "all cameras rolled together: each is still the turned input camera",
+            "not_reprojected",
+            "scenes/room/views/input/instance.png",
+            |root| {
                 Room::of(root).edit_scene(|scene| {
                     roll(&mut scene["views"][0], 3.0);
                     let input: Camera = serde_json::from_value(scene["views"][0]["camera"].clone()).unwrap();
@@ -167,14 +140,10 @@ fn cameras() {
                     }
                 });
             },
-        },
-        Fault {
-            what: "a matrix that is not a rotation",
-            expected: ("bad_camera", "scenes/room/scene.json"),
-            plant: |root| {
-                Room::of(root).edit_scene(|s| s["views"][0]["camera"]["world_from_camera"][0][0] = Value::from(2.0));
-            },
-        },
+        ),
+        fault("a matrix that is not a rotation", "bad_camera", "scenes/room/scene.json", |root| {
+            Room::of(root).edit_scene(|s| s["views"][0]["camera"]["world_from_camera"][0][0] = Value::from(2.0));
+        }),
     ];
     check_all(&faults, true, 3);
 }
@@ -182,85 +151,64 @@ fn cameras() {
 #[test]
 fn pictures() {
     let faults = [
-        Fault {
-            what: "depth times 1.01",
-            expected: ("not_reprojected", "scenes/room/views/up_right/depth.exr"),
-            plant: |root| {
-                let path = Room::of(root).file("views/up_right/depth.exr");
-                let scaled = exr_io::read_scalar(&path).unwrap().map(|depth| depth * 1.01);
-                exr_io::write_scalar(&path, &scaled, Precision::Float).unwrap();
-            },
-        },
-        Fault {
-            what: "an instance beyond the list",
-            expected: ("bad_id", "scenes/room/views/input/instance.png"),
-            plant: |root| Room::of(root).edit_ids("views/input/instance.png", |id| if id == 1 { 60_000 } else { id }),
-        },
-        Fault {
-            what: "shuffled parts",
-            expected: ("bad_id", "scenes/room/views/input/part.png"),
-            plant: |root| Room::of(root).edit_ids("views/input/part.png", |id| if id < 2 { id } else { id - 1 }),
-        },
-        Fault {
-            what: "shuffled parts of one instance",
-            expected: ("not_reprojected", "scenes/room/views/input/part.png"),
-            plant: shuffle_the_sofa,
-        },
-        Fault {
-            what: "unobserved pixels where nothing is valid",
-            expected: ("bad_mask", "scenes/room/views/up_left/unobserved.png"),
-            plant: |root| {
+        fault("depth times 1.01", "not_reprojected", "scenes/room/views/up_right/depth.exr", |root| {
+            let path = Room::of(root).file("views/up_right/depth.exr");
+            let scaled = exr_io::read_scalar(&path).unwrap().map(|depth| depth * 1.01);
+            exr_io::write_scalar(&path, &scaled, Precision::Float).unwrap();
+        }),
+        fault("an instance beyond the list", "bad_id", "scenes/room/views/input/instance.png", |root| {
+            Room::of(root).edit_ids("views/input/instance.png", |id| if id == 1 { 60_000 } else { id })
+        }),
+        fault("shuffled parts", "bad_id", "scenes/room/views/input/part.png", |root| {
+            Room::of(root).edit_ids("views/input/part.png", |id| if id < 2 { id } else { id - 1 })
+        }),
+        fault(
+            "shuffled parts of one instance",
+            "not_reprojected",
+            "scenes/room/views/input/part.png",
+            shuffle_the_sofa,
+        ),
+        fault(
+            "unobserved pixels where nothing is valid",
+            "bad_mask",
+            "scenes/room/views/up_left/unobserved.png",
+            |root| {
                 let room = Room::of(root);
                 let valid = png_io::read_mask(&room.file("views/up_left/valid.png")).unwrap();
                 room.edit_mask("views/up_left/unobserved.png", |x, y, counts| counts || !valid.get(x, y));
             },
-        },
-        Fault {
-            what: "unobserved pixels that the input view shows",
-            expected: ("not_reprojected", "scenes/room/views/up_left/unobserved.png"),
-            plant: |root| {
+        ),
+        fault(
+            "unobserved pixels that the input view shows",
+            "not_reprojected",
+            "scenes/room/views/up_left/unobserved.png",
+            |root| {
                 let room = Room::of(root);
                 let valid = png_io::read_mask(&room.file("views/up_left/valid.png")).unwrap();
                 room.edit_mask("views/up_left/unobserved.png", |x, y, _| valid.get(x, y));
             },
-        },
-        Fault {
-            what: "no unobserved pixel",
-            expected: ("not_reprojected", "scenes/room/views/up_left/unobserved.png"),
-            plant: |root| Room::of(root).edit_mask("views/up_left/unobserved.png", |_, _, _| false),
-        },
-        Fault {
-            what: "no valid pixel",
-            expected: ("not_reprojected", "scenes/room/views/input/valid.png"),
-            plant: |root| Room::of(root).edit_mask("views/input/valid.png", |_, _, _| false),
-        },
-        Fault {
-            what: "normals that all point up",
-            expected: ("not_reprojected", "scenes/room/views/input/normal.exr"),
-            plant: |root| {
-                let path = Room::of(root).file("views/input/normal.exr");
-                let normals = exr_io::read_normal(&path).unwrap();
-                let up = normals.map(|normal| if normal.0 == [0.0; 3] { normal } else { Normal([0.0, 1.0, 0.0]) });
-                exr_io::write_normal(&path, &up, Precision::Half).unwrap();
-            },
-        },
-        Fault {
-            what: "normals of length 0",
-            expected: ("bad_normal", "scenes/room/views/down_left/normal.exr"),
-            plant: |root| {
-                let path = Room::of(root).file("views/down_left/normal.exr");
-                let zero = exr_io::read_normal(&path).unwrap().map(|_| Normal::default());
-                exr_io::write_normal(&path, &zero, Precision::Half).unwrap();
-            },
-        },
-        Fault {
-            what: "a picture of another size",
-            expected: ("wrong_size", "scenes/room/views/input/valid.png"),
-            plant: |root| {
-                let path = Room::of(root).file("views/input/valid.png");
-                png_io::write_mask(&path, &Picture::filled(96, 71, true)).unwrap();
-            },
-        },
+        ),
+        fault("no unobserved pixel", "not_reprojected", "scenes/room/views/up_left/unobserved.png", |root| {
+            Room::of(root).edit_mask("views/up_left/unobserved.png", |_, _, _| false)
+        }),
+        fault("no valid pixel", "not_reprojected", "scenes/room/views/input/valid.png", |root| {
+            Room::of(root).edit_mask("views/input/valid.png", |_, _, _| false)
+        }),
+        fault("normals that all point up", "not_reprojected", "scenes/room/views/input/normal.exr", |root| {
+            let path = Room::of(root).file("views/input/normal.exr");
+            let normals = exr_io::read_normal(&path).unwrap();
+            let up = normals.map(|normal| if normal.0 == [0.0; 3] { normal } else { Normal([0.0, 1.0, 0.0]) });
+            exr_io::write_normal(&path, &up, Precision::Half).unwrap();
+        }),
+        fault("normals of length 0", "bad_normal", "scenes/room/views/down_left/normal.exr", |root| {
+            let path = Room::of(root).file("views/down_left/normal.exr");
+            let zero = exr_io::read_normal(&path).unwrap().map(|_| Normal::default());
+            exr_io::write_normal(&path, &zero, Precision::Half).unwrap();
+        }),
+        fault("a picture of another size", "wrong_size", "scenes/room/views/input/valid.png", |root| {
+            let path = Room::of(root).file("views/input/valid.png");
+            png_io::write_mask(&path, &Picture::filled(96, 71, true)).unwrap();
+        }),
     ];
     check_all(&faults, true, 11);
 }
@@ -279,114 +227,98 @@ fn shuffle_the_sofa(root: &Path) {
 
 #[test]
 fn meshes() {
-    let faults =
-        [
-            Fault {
-                what: "a uv outside the atlas",
-                expected: ("bad_uv", "scenes/room/geometry/instances.glb"),
-                plant: |root| {
-                    let instances = "geometry/instances.glb";
-                    Room::of(root).edit_glb(instances, "rug", "TEXCOORD_0", |at, uv| if at == 0 { 1.5 } else { uv });
-                },
+    let faults = [
+        fault("a uv outside the atlas", "bad_uv", "scenes/room/geometry/instances.glb", |root| {
+            let instances = "geometry/instances.glb";
+            Room::of(root).edit_glb(instances, "rug", "TEXCOORD_0", |at, uv| if at == 0 { 1.5 } else { uv });
+        }),
+        fault("a vertex moved in one file", "bad_parts", "scenes/room/geometry/parts.glb", |root| {
+            let moved = |at: usize, x: f32| if at == 0 { x + 0.1 } else { x };
+            Room::of(root).edit_glb("geometry/instances.glb", "rug", "POSITION", moved);
+        }),
+        fault(
+            "the rug moved in both files",
+            "wrong_geometry",
+            "scenes/room/ground_truth/reference/geometry.glb",
+            |root| {
+                let room = Room::of(root);
+                let scene = super::sample::json(&room.file("scene.json"));
+                let of_rug = |part: &&Value| part["instance"] == "rug";
+                let raised = |at: usize, x: f32| if at % 3 == 1 { x + 0.1 } else { x };
+                room.edit_glb("geometry/instances.glb", "rug", "POSITION", raised);
+                for part in scene["parts"].as_array().unwrap().iter().filter(of_rug) {
+                    room.edit_glb("geometry/parts.glb", part["id"].as_str().unwrap(), "POSITION", raised);
+                }
             },
-            Fault {
-                what: "a vertex moved in one file",
-                expected: ("bad_parts", "scenes/room/geometry/parts.glb"),
-                plant: |root| {
-                    Room::of(root).edit_glb("geometry/instances.glb", "rug", "POSITION", |at, x| {
-                        if at == 0 { x + 0.1 } else { x }
-                    });
-                },
-            },
-            Fault {
-                what: "the rug moved in both files",
-                expected: ("wrong_geometry", "scenes/room/ground_truth/reference/geometry.glb"),
-                plant: |root| {
-                    let room = Room::of(root);
-                    let scene = super::sample::json(&room.file("scene.json"));
-                    let of_rug = |part: &&Value| part["instance"] == "rug";
-                    let raised = |at: usize, x: f32| if at % 3 == 1 { x + 0.1 } else { x };
-                    room.edit_glb("geometry/instances.glb", "rug", "POSITION", raised);
-                    for part in scene["parts"].as_array().unwrap().iter().filter(of_rug) {
-                        room.edit_glb("geometry/parts.glb", part["id"].as_str().unwrap(), "POSITION", raised);
-                    }
-                },
-            },
-            Fault {
-                what: "instances in place of parts",
-                expected: ("wrong_nodes", "scenes/room/geometry/parts.glb"),
-                plant: |root| {
-                    let room = Room::of(root);
-                    std::fs::copy(room.file("geometry/instances.glb"), room.file("geometry/parts.glb")).unwrap();
-                },
-            },
-        ];
+        ),
+        fault("instances in place of parts", "wrong_nodes", "scenes/room/geometry/parts.glb", |root| {
+            let room = Room::of(root);
+            std::fs::copy(room.file("geometry/instances.glb"), room.file("geometry/parts.glb")).unwrap();
+        }),
+    ];
     check_all(&faults, true, 4);
 }
 
 #[test]
 fn ground_truth() {
     let faults = [
-        Fault {
-            what: "a baked map of another size",
-            expected: ("wrong_size", "scenes/room/ground_truth/materials/sofa/base_color.png"),
-            plant: |root| {
+        fault(
+            "a baked map of another size",
+            "wrong_size",
+            "scenes/room/ground_truth/materials/sofa/base_color.png",
+            |root| {
                 let path = Room::of(root).file("ground_truth/materials/sofa/base_color.png");
                 png_io::write_rgb_bytes(&path, &Picture::filled(64, 64, [9; 3])).unwrap();
             },
-        },
-        Fault {
-            what: "an albedo of another view",
-            expected: ("not_reprojected", "scenes/room/ground_truth/views/input/albedo.exr"),
-            plant: |root| {
+        ),
+        fault(
+            "an albedo of another view",
+            "not_reprojected",
+            "scenes/room/ground_truth/views/input/albedo.exr",
+            |root| {
                 let other = Room::of(root).file("ground_truth/views/up_left/albedo.exr");
                 std::fs::copy(other, Room::of(root).file("ground_truth/views/input/albedo.exr")).unwrap();
             },
-        },
-        Fault {
-            what: "an albedo that is not a number",
-            expected: ("unreadable", "scenes/room/ground_truth/views/input/albedo.exr"),
-            plant: |root| {
+        ),
+        fault(
+            "an albedo that is not a number",
+            "unreadable",
+            "scenes/room/ground_truth/views/input/albedo.exr",
+            |root| {
                 let path = Room::of(root).file("ground_truth/views/input/albedo.exr");
                 let mut albedo = exr_io::read_linear(&path).unwrap();
                 albedo.set(5, 5, LinearRgb([f32::NAN; 3]));
                 exr_io::write_linear(&path, &albedo, Precision::Float).unwrap();
             },
-        },
-        Fault {
-            what: "a metallic above one",
-            expected: ("out_of_range", "scenes/room/ground_truth/views/input/metallic.exr"),
-            plant: |root| {
-                let path = Room::of(root).file("ground_truth/views/input/metallic.exr");
-                let raised = exr_io::read_scalar(&path).unwrap().map(|value| value + 0.5);
-                exr_io::write_scalar(&path, &raised, Precision::Float).unwrap();
-            },
-        },
-        Fault {
-            what: "an input picture that is another view's",
-            expected: ("wrong_input", "scenes/room/views/input/rgb.exr"),
-            plant: |root| {
-                let room = Room::of(root);
-                let other = room.file("ground_truth/renders/builtin/up_left/rgb.exr");
-                std::fs::copy(other, room.file("views/input/rgb.exr")).unwrap();
-            },
-        },
-        Fault {
-            what: "a view that another device rendered",
-            expected: ("mixed_devices", "scenes/room/ground_truth/renders/builtin/up_left/render.json"),
-            plant: |root| {
+        ),
+        fault("a metallic above one", "out_of_range", "scenes/room/ground_truth/views/input/metallic.exr", |root| {
+            let path = Room::of(root).file("ground_truth/views/input/metallic.exr");
+            let raised = exr_io::read_scalar(&path).unwrap().map(|value| value + 0.5);
+            exr_io::write_scalar(&path, &raised, Precision::Float).unwrap();
+        }),
+        fault("an input picture that is another view's", "wrong_input", "scenes/room/views/input/rgb.exr", |root| {
+            let room = Room::of(root);
+            let other = room.file("ground_truth/renders/builtin/up_left/rgb.exr");
+            std::fs::copy(other, room.file("views/input/rgb.exr")).unwrap();
+        }),
+        fault(
+            "a view that another device rendered",
+            "mixed_devices",
+            "scenes/room/ground_truth/renders/builtin/up_left/render.json",
+            |root| {
                 edit_json(&Room::of(root).file("ground_truth/renders/builtin/up_left/render.json"), |file| {
                     file["device"] = serde_json::json!({"kind": "cuda", "name": "a card", "driver": null});
                 });
             },
-        },
-        Fault {
-            what: "a missing render",
-            expected: ("unreadable", "scenes/room/ground_truth/renders/builtin/down_right/rgb_b.exr"),
-            plant: |root| {
+        ),
+        fault(
+            "a missing render",
+            "unreadable",
+            "scenes/room/ground_truth/renders/builtin/down_right/rgb_b.exr",
+            |root| {
                 std::fs::remove_file(Room::of(root).file("ground_truth/renders/builtin/down_right/rgb_b.exr")).unwrap();
             },
-        },
+        ),
     ];
     check_all(&faults, true, 7);
 }
