@@ -387,10 +387,15 @@ mod tests {
     #[test]
     fn the_standard_error_is_the_spread() {
         let all = tiles(SIZE.0, SIZE.1);
-        for tiles in [&all[..1], &all[..]] {
-            let pixels: Vec<_> = tiles.iter().flat_map(|tile| tile.pixels()).collect();
-            let drawn: Vec<_> =
-                (0..400).map(|k| difference(&plain(2 * k, 0.3), &plain(2 * k + 1, 0.3), pixels.clone())).collect();
+        let pixels = [&all[..1], &all[..]].map(|tiles| tiles.iter().flat_map(|tile| tile.pixels()).collect::<Vec<_>>());
+        let mut drawn = [Vec::new(), Vec::new()];
+        for k in 0..400 {
+            let (ours, theirs) = (plain(2 * k, 0.3), plain(2 * k + 1, 0.3));
+            for (drawn, pixels) in drawn.iter_mut().zip(&pixels) {
+                drawn.push(difference(&ours, &theirs, pixels.iter().copied()));
+            }
+        }
+        for drawn in drawn {
             let spread = (drawn.iter().map(|d| d.mean[1] * d.mean[1]).sum::<f64>() / 400.0).sqrt();
             let estimated = (drawn.iter().map(|d| d.error[1] * d.error[1]).sum::<f64>() / 400.0).sqrt();
             assert!((spread / estimated - 1.0).abs() < 0.1, "{spread} {estimated}");
