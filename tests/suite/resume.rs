@@ -7,8 +7,12 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use super::command::{build, mateval, render, run, verify};
-use super::sample::{SMALL, copied_dataset, dataset, manifest, recipe_text, write_source};
+use super::sample::{copied_dataset, dataset, manifest, recipe_text, write_source};
 use mateval_testkit::{copy_folder, kept_folder};
+
+/// Of small pictures and atlases. A render that is killed within the view `up_left` has yet to render another one.
+const HEAD: &str = "resolution = [64, 48]\natlas_size = 64\n\
+                    views = [{ id = \"up_left\", x_deg = 5, y_deg = 5 }, { id = \"up_right\", x_deg = 5, y_deg = -5 }]";
 
 /// A source whose recipe has two scenes, its whole dataset, and that one's manifest.
 struct Whole {
@@ -19,7 +23,7 @@ struct Whole {
 
 static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     let folder = kept_folder("resume");
-    let recipe = write_source(&folder.join("source"), SMALL, &["first", "second"]);
+    let recipe = write_source(&folder.join("source"), HEAD, &["first", "second"]);
     let dataset = folder.join("dataset");
     run(&mut build(&recipe, &dataset)).ends_with(0);
     let manifest = manifest(&dataset);
@@ -106,7 +110,7 @@ fn half_written_scenes_are_made_again() {
 fn files_that_were_missing_before_are_used() {
     let folder = tempfile::tempdir().unwrap();
     let (source, out) = (folder.path().join("source"), folder.path().join("dataset"));
-    let recipe = write_source(&source, SMALL, &["first", "second"]);
+    let recipe = write_source(&source, HEAD, &["first", "second"]);
     let [texture, aside] = ["room/textures/outside.png", "outside.png"].map(|name| source.join(name));
     std::fs::rename(&texture, &aside).unwrap();
     kill_when(&mut build(&recipe, &out), || out.join(".build/scenes/first.json").is_file());
@@ -127,7 +131,7 @@ fn another_recipe_does_not_resume() {
     let out = folder.path().join("dataset");
     kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/scenes/first.json").is_file());
     let other = WHOLE.recipe.with_file_name("other.toml");
-    std::fs::write(&other, recipe_text("resolution = [80, 60]\natlas_size = 128", &["first", "second"])).unwrap();
+    std::fs::write(&other, recipe_text(&HEAD.replace("[64, 48]", "[48, 36]"), &["first", "second"])).unwrap();
     run(&mut build(&other, &out)).ends_with(2).says("1 scene would be made otherwise: 'first'").says("--force");
     assert_unfinished(&out);
     assert!(out.join(".build/scenes/first.json").is_file(), "the refusal changed the folder");
@@ -155,18 +159,20 @@ fn a_killed_render_resumes() {
 /// The build is resumed over what a killed render left, as `mateval demo` does it. `prep finish` refuses that.
 #[test]
 fn a_build_resumes_after_a_killed_render() {
+    // As many as it takes for the last view to be rendered after `up_left` for a while.
+    const SAMPLES: u32 = 8;
     let folder = tempfile::tempdir().unwrap();
     let [whole, out] = ["whole", "cut_off"].map(|name| folder.path().join(name));
     [&whole, &out].into_iter().for_each(|copy| copy_folder(&WHOLE.dataset, copy));
-    run(&mut render(&whole, 1)).ends_with(0);
+    run(&mut render(&whole, SAMPLES)).ends_with(0);
     let renders = out.join("scenes/first/ground_truth/renders/builtin");
-    kill_when(&mut render(&out, 1), || renders.join("up_left/rgb_a.exr").is_file());
+    kill_when(&mut render(&out, SAMPLES), || renders.join("up_left/rgb_a.exr").is_file());
     let resumes = format!("mateval prep render {} --renderer builtin", out.display());
     run(mateval().args(["prep", "finish"]).arg(&out)).ends_with(2).says("unlisted_file").says(&resumes);
     run(mateval().args(["prep", "stats"]).arg(&out)).ends_with(0);
     assert!(run(&mut verify(&out)).ends_with(1).stdout.contains(&resumes));
     run(&mut build(&WHOLE.recipe, &out)).ends_with(0).says("scene 'first' was already made");
-    run(&mut render(&out, 1)).ends_with(0);
+    run(&mut render(&out, SAMPLES)).ends_with(0);
     assert!(manifest(&out) == manifest(&whole));
 
     // Only pictures of a scene that was being rendered: anything else is still a fault.
