@@ -109,8 +109,16 @@ pub fn baseline(name: &str, dataset: &Path, submission: &Path) -> Command {
 
 /// `mateval eval score SUBMISSION --dataset DATASET --out RESULT` under both protocols.
 pub fn score(submission: &Path, dataset: &Path, result: &Path) -> Command {
+    score_under(&["mateval-3", "paper"], submission, dataset, result)
+}
+
+/// The same under these protocols.
+pub fn score_under(protocols: &[&str], submission: &Path, dataset: &Path, result: &Path) -> Command {
     let mut command = mateval();
-    command.args(["eval", "score", "--protocol", "mateval-3", "--protocol", "paper"]).arg(submission);
-    command.arg("--dataset").arg(dataset).arg("--out").arg(result);
+    command.args(["eval", "score"]);
+    for protocol in protocols {
+        command.arg("--protocol").arg(protocol);
+    }
+    command.arg(submission).arg("--dataset").arg(dataset).arg("--out").arg(result);
     command
 }

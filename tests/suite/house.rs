@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::command::{Run, baseline, build, mateval, run, score, stats, verify};
+use super::command::{Run, baseline, build, mateval, run, score_under, stats, verify};
 use super::sample::{files_below, json};
 use mateval_testkit::faulty_house;
 use mateval_testkit::{copy_folder, kept_folder};
@@ -162,7 +162,8 @@ fn accepted_rooms_become_a_dataset_that_can_be_scored() {
     let psnr = |name: &str| {
         let [submission, result] = [name.to_owned(), format!("{name}.json")].map(|name| folder.path().join(name));
         run(&mut baseline(name, &dataset, &submission)).ends_with(0);
-        run(score(&submission, &dataset, &result).env("MATEVAL_CACHE", folder.path())).ends_with(0);
+        let mut command = score_under(&["mateval-3"], &submission, &dataset, &result);
+        run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0);
         json(&result)["protocols"]["mateval-3"]["summary"]["albedo.input.psnr"].as_f64().unwrap()
     };
     let (truth, grey) = (psnr("gt"), psnr("grey"));

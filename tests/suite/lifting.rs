@@ -11,7 +11,7 @@ use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, png_io};
 use serde_json::Value;
 
-use super::command::{Run, baseline, build, mateval, run, score};
+use super::command::{Run, baseline, build, mateval, run, score_under};
 use super::sample::{json, write_source};
 use mateval_testkit::{kept_folder, npy};
 
@@ -42,7 +42,7 @@ fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
 pub fn summary_of(dataset: &Path, submission: &Path) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let result = folder.path().join("result.json");
-    let mut command = score(submission, dataset, &result);
+    let mut command = score_under(&["mateval-3"], submission, dataset, &result);
     run(command.env("MATEVAL_CACHE", folder.path().join("no-such-folder"))).ends_with(0);
     json(&result)["protocols"]["mateval-3"]["summary"].clone()
 }

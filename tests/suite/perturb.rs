@@ -11,7 +11,7 @@ use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, exr_io, png_io};
 use serde_json::{Value, json};
 
-use super::command::{Run, baseline, mateval, run, score, verify};
+use super::command::{Run, baseline, mateval, run, score_under, verify};
 use super::sample::{files_below, json, unrendered};
 use super::stated::dataset;
 use mateval_testkit::copy_folder;
@@ -132,7 +132,8 @@ fn submissions_are_scored_on_the_true_geometry() {
     let path = |name: &str| folder.path().join(name);
     let summary = |submission: &Path| -> (Value, Value) {
         let result = submission.with_extension("json");
-        run(score(submission, dataset(), &result).env("MATEVAL_CACHE", folder.path())).ends_with(0);
+        let mut command = score_under(&["mateval-3"], submission, dataset(), &result);
+        run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0);
         let result = json(&result);
         (result["protocols"]["mateval-3"]["summary"].clone(), result["submission"]["geometry"].clone())
     };

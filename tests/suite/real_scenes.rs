@@ -6,7 +6,7 @@ use mateval_dataset::Severity;
 use mateval_sources::bitterli;
 use mateval_testkit::shared_data;
 
-use super::command::{baseline, build, run, score, verify};
+use super::command::{baseline, build, run, score_under, verify};
 use super::sample::json;
 
 /// Builds staircase2 with this line in the recipe's head; returns the summary of `gt`'s scores.
@@ -17,7 +17,8 @@ fn staircase(source: &Path, folder: &Path, line: &str) -> serde_json::Value {
     let [dataset, submission, result] = ["dataset", "gt", "RESULT.json"].map(|name| folder.join(name));
     run(build(&recipe, &dataset).arg("--source").arg(source)).ends_with(0);
     run(&mut baseline("gt", &dataset, &submission)).ends_with(0);
-    run(score(&submission, &dataset, &result).env("MATEVAL_CACHE", folder)).ends_with(0);
+    let mut command = score_under(&["mateval-3"], &submission, &dataset, &result);
+    run(command.env("MATEVAL_CACHE", folder)).ends_with(0);
     json(&result)["protocols"]["mateval-3"]["summary"].clone()
 }
 

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::command::{baseline, build, render_for_scores, run, score, verify};
+use super::command::{baseline, build, render_for_scores, run, score_under, verify};
 use super::sample::{copy_source, json};
 use mateval_testkit::{copy_folder, kept_folder};
 
@@ -88,7 +88,8 @@ fn the_truth_beats_the_old_constants() {
     }
     let summary = |submission: &Path| {
         let result = submission.with_extension("json");
-        run(score(submission, dataset, &result).env("MATEVAL_CACHE", folder.path())).ends_with(0);
+        let mut command = score_under(&["mateval-3"], submission, dataset, &result);
+        run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0);
         json(&result)["protocols"]["mateval-3"]["summary"].clone()
     };
     let (truth, constant) = (summary(&truth), summary(&constant));
