@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::command::{Run, baseline, mateval, run};
 use super::lifting::{ROOM, base_colors, truth};
-use super::sample::json;
+use super::sample::{json, unrendered};
 
 /// A folder with an adapter `a.toml`, whose keys are these beside the paths, and a picture `room.exr`.
 fn estimate(above: &str, keys: &str, picture: &Picture<LinearRgb>) -> tempfile::TempDir {
@@ -22,14 +22,14 @@ fn estimate(above: &str, keys: &str, picture: &Picture<LinearRgb>) -> tempfile::
     folder
 }
 
-fn nn(folder: &Path, adapter: &str, out: &Path) -> Run {
-    run(baseline("nn", &ROOM, out).arg("--estimate").arg(folder).args(["--adapter", adapter]))
+fn nn(dataset: &Path, folder: &Path, adapter: &str, out: &Path) -> Run {
+    run(baseline("nn", dataset, out).arg("--estimate").arg(folder).args(["--adapter", adapter]))
 }
 
 /// `baseline nn` with the folder's adapter `a.toml`.
-fn lifted(folder: &tempfile::TempDir) -> PathBuf {
+fn lifted(dataset: &Path, folder: &tempfile::TempDir) -> PathBuf {
     let out = folder.path().join("out");
-    nn(folder.path(), &folder.path().join("a.toml").to_string_lossy(), &out).ends_with(0);
+    nn(dataset, folder.path(), &folder.path().join("a.toml").to_string_lossy(), &out).ends_with(0);
     out
 }
 
@@ -57,7 +57,7 @@ fn other_proportions_are_placed_by_the_adapters_rule() {
         })
     };
     let as_it_is = estimate("", linear, &shown(192, 144, 0.0));
-    let as_it_is = (lifted(&as_it_is), as_it_is);
+    let as_it_is = (lifted(&ROOM, &as_it_is), as_it_is);
     // Stretched to a square, and the square in the middle of 96x72 pixels.
     let (stretched, cropped) = (shown(192, 192, 0.0), shown(144, 144, 12.0 / 96.0));
     for (picture, rule, other, most) in
@@ -65,7 +65,7 @@ fn other_proportions_are_placed_by_the_adapters_rule() {
     {
         let placed = |rule: &str| {
             let folder = estimate(&format!("placement = \"{rule}\""), linear, picture);
-            apart(&lifted(&folder), &as_it_is.0)
+            apart(&lifted(&ROOM, &folder), &as_it_is.0)
         };
         let (right, wrong) = (placed(rule), placed(other));
         assert!(right < most, "{rule}: {right}");
@@ -87,19 +87,19 @@ fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
 
 #[test]
 fn a_numpy_file_is_read_like_the_exr() {
-    let picture = truth(&ROOM);
+    let picture = truth(unrendered());
     let folder = estimate("", "encoding = \"linear\"", &picture);
-    let from_exr = base_colors(&lifted(&folder));
+    let from_exr = base_colors(&lifted(unrendered(), &folder));
     std::fs::remove_dir_all(folder.path().join("out")).unwrap();
     let data: Vec<u8> = picture.pixels().iter().flat_map(|pixel| pixel.0).flat_map(f32::to_le_bytes).collect();
     let write = |bytes: Vec<u8>| std::fs::write(folder.path().join("room.npy"), bytes).unwrap();
     write(npy("<f4", "72, 96, 3", &data));
-    assert!(from_exr == base_colors(&lifted(&folder)));
+    assert!(from_exr == base_colors(&lifted(unrendered(), &folder)));
     // Bad input: the error names the file and what was expected.
     let refused = |bytes: Vec<u8>, reason: &str| {
         write(bytes);
         let adapter = folder.path().join("a.toml");
-        nn(folder.path(), &adapter.to_string_lossy(), &folder.path().join("bad"))
+        nn(unrendered(), folder.path(), &adapter.to_string_lossy(), &folder.path().join("bad"))
             .ends_with(2)
             .says("room.npy")
             .says(reason);
@@ -119,12 +119,12 @@ fn encodings_that_authors_do_not_state_are_in_submission_json() {
     let folder = tempfile::tempdir().unwrap();
     let room = folder.path().join("room");
     std::fs::create_dir_all(&room).unwrap();
-    let bytes = truth(&ROOM).map(|LinearRgb(rgb)| rgb.map(byte_from_unit));
+    let bytes = truth(unrendered()).map(|LinearRgb(rgb)| rgb.map(byte_from_unit));
     for name in ["000_albedo.png", "000_roughness.png", "000_metallic.png", "base_color.png"] {
         png_io::write_rgb_bytes(&room.join(name), &bytes).unwrap();
     }
     let [marked, plain] = ["marked", "plain"].map(|name| folder.path().join(name));
-    nn(folder.path(), "mvinverse", &marked)
+    nn(unrendered(), folder.path(), "mvinverse", &marked)
         .ends_with(0)
         .says("the adapter 'mvinverse' reads base_color as linear, roughness as linear, metallic as linear");
     let file = json(&marked.join("submission.json"));
@@ -132,11 +132,11 @@ fn encodings_that_authors_do_not_state_are_in_submission_json() {
     assert_eq!(file["assumed_encodings"], expected);
     let said = file["description"].as_str().unwrap();
     assert!(said.contains("its authors do not state the encoding of base_color, roughness, metallic"), "{said}");
-    let lint = |out: &Path| run(mateval().args(["eval", "lint"]).arg(out).arg("--dataset").arg(&*ROOM));
+    let lint = |out: &Path| run(mateval().args(["eval", "lint"]).arg(out).arg("--dataset").arg(unrendered()));
     let found = lint(&marked);
     assert!(!found.stdout.contains("assumed_encodings"), "{}", found.stdout);
     // Twin: the encodings of `plain` are stated, and another word is an error.
-    nn(folder.path(), "plain", &plain)
+    nn(unrendered(), folder.path(), "plain", &plain)
         .ends_with(0)
         .says("the adapter 'plain' reads base_color as srgb, roughness as linear, metallic as linear");
     assert!(json(&plain.join("submission.json")).get("assumed_encodings").is_none());
@@ -147,8 +147,8 @@ fn encodings_that_authors_do_not_state_are_in_submission_json() {
 
 /// The report on the truth's albedo whose numbers are `encode` of a linear value and the instance's number.
 fn encoding(adapter_encoding: &str, encode: impl Fn(f32, u16) -> f32) -> (Run, Value) {
-    let ids = png_io::read_ids(&ROOM.join("scenes/room/views/input/instance.png")).unwrap();
-    let albedo = truth(&ROOM);
+    let ids = png_io::read_ids(&unrendered().join("scenes/room/views/input/instance.png")).unwrap();
+    let albedo = truth(unrendered());
     let picture = Picture::from_fn(albedo.width(), albedo.height(), |x, y| {
         LinearRgb(albedo.get(x, y).0.map(|value| encode(value, ids.get(x, y))))
     });
@@ -156,7 +156,7 @@ fn encoding(adapter_encoding: &str, encode: impl Fn(f32, u16) -> f32) -> (Run, V
     let report = |words: &[&str]| {
         let mut command = mateval();
         command.args(["baseline", "encoding"]).arg(folder.path()).arg("--adapter").arg(folder.path().join("a.toml"));
-        run(command.arg("--dataset").arg(&*ROOM).args(words))
+        run(command.arg("--dataset").arg(unrendered()).args(words))
     };
     let value = serde_json::from_str(&report(&["--format", "json"]).stdout).unwrap();
     (report(&[]), value)
@@ -210,7 +210,7 @@ fn a_folder_without_pictures_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let report = |path: &Path| {
         let mut command = mateval();
-        run(command.args(["baseline", "encoding", "--adapter", "iid"]).arg(path).arg("--dataset").arg(&*ROOM))
+        run(command.args(["baseline", "encoding", "--adapter", "iid"]).arg(path).arg("--dataset").arg(unrendered()))
     };
     report(folder.path()).ends_with(2).says("room_albedo.png").says("run the method");
     report(&folder.path().join("none")).ends_with(2).says("does not exist");

@@ -12,14 +12,14 @@ use mateval_image::{LinearRgb, Picture, png_io};
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, score_under};
-use super::sample::{json, write_source};
+use super::sample::{json, unrendered, write_source};
 use mateval_testkit::{kept_folder, npy};
 
 /// Width and height of the room's pictures, in pixels.
 const WIDTH: usize = 96;
 const HEIGHT: usize = 72;
 
-/// The sample's room, atlas sizes chosen by the tool.
+/// The sample's room, atlas sizes chosen by the tool. Where these do not matter, [`unrendered`] has smaller ones.
 pub static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("lifting");
     let recipe = write_source(&folder.join("source"), &format!("resolution = [{WIDTH}, {HEIGHT}]"), &["room"]);
@@ -119,11 +119,11 @@ fn three_encodings_of_one_estimate_give_one_atlas() {
     let encodings: [(&str, Encode); 3] =
         [("linear", |v| v), ("srgb", srgb_from_linear), ("gamma22", |v| v.max(0.0).powf(1.0 / 2.2))];
     let folder = tempfile::tempdir().unwrap();
-    let picture = truth(&ROOM);
+    let picture = truth(unrendered());
     let atlases = encodings.map(|(name, encode)| {
         let estimate = estimate(name, &picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(encode))));
         let out = folder.path().join(name);
-        run(baseline("nn", &ROOM, &out).args(lifted_words(&estimate))).ends_with(0);
+        run(baseline("nn", unrendered(), &out).args(lifted_words(&estimate))).ends_with(0);
         base_colors(&out)
     });
     for other in &atlases[1..] {
@@ -141,7 +141,7 @@ fn three_encodings_of_one_estimate_give_one_atlas() {
     // Twin: a wrong encoding changes the result.
     let wrong = estimate("srgb", &picture);
     let out = folder.path().join("wrong");
-    run(baseline("nn", &ROOM, &out).args(lifted_words(&wrong))).ends_with(0);
+    run(baseline("nn", unrendered(), &out).args(lifted_words(&wrong))).ends_with(0);
     assert!(atlases[0] != base_colors(&out));
 }
 
@@ -227,17 +227,17 @@ fn an_estimate_may_lack_maps_of_its_adapter() {
     let folder = tempfile::tempdir().unwrap();
     let [estimates, out] = ["estimates", "out"].map(|name| folder.path().join(name));
     std::fs::create_dir_all(estimates.join("room")).unwrap();
-    let picture = truth(&ROOM).map(|LinearRgb(rgb)| rgb.map(|v| (srgb_from_linear(v) * 255.0).round() as u8));
+    let picture = truth(unrendered()).map(|LinearRgb(rgb)| rgb.map(|v| (srgb_from_linear(v) * 255.0).round() as u8));
     png_io::write_rgb_bytes(&estimates.join("room/base_color.png"), &picture).unwrap();
     png_io::write_rgb_bytes(&estimates.join("room/metallic.png"), &picture.map(|_| [255; 3])).unwrap();
-    run(baseline("nn", &ROOM, &out).arg("--estimate").arg(&estimates)).ends_with(0);
+    run(baseline("nn", unrendered(), &out).arg("--estimate").arg(&estimates)).ends_with(0);
     let said = json(&out.join("submission.json"))["description"].as_str().unwrap().to_owned();
     assert!(said.contains("base_color of 1 scene, roughness of none, metallic of 1 scene"), "{said}");
     let floor = out.join("scenes/room/floor");
     assert!(floor.join("metallic.png").is_file() && !floor.join("roughness.png").exists());
     // Twin: base colour is not optional.
     std::fs::remove_file(estimates.join("room/base_color.png")).unwrap();
-    run(baseline("nn", &ROOM, &folder.path().join("none")).arg("--estimate").arg(&estimates))
+    run(baseline("nn", unrendered(), &folder.path().join("none")).arg("--estimate").arg(&estimates))
         .ends_with(2)
         .says("base_color.png");
 }
