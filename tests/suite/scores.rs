@@ -2,7 +2,7 @@
 //! that cannot be compared, and missing metrics are reported.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use mateval_image::transfer::linear_from_srgb_byte;
@@ -10,38 +10,42 @@ use mateval_image::{exr_io, png_io};
 use mateval_testkit::report_missing;
 use serde_json::Value;
 
-use super::command::{baseline, build, mateval, run, score};
+use super::command::{Run, baseline, build, mateval, run, score, score_under};
 use super::sample::{json, write_source};
 use mateval_testkit::kept_folder;
 
-/// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen
-/// by the tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.
-static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
+struct Scored {
+    /// Holds `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen by
+    /// the tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.
+    folder: PathBuf,
+    /// How `grey` was scored.
+    run_of_grey: Run,
+}
+
+static SCORED: LazyLock<Scored> = LazyLock::new(|| {
     let folder = kept_folder("scores");
+    let dataset = folder.join("dataset");
     let recipe = write_source(&folder.join("source"), "resolution = [160, 120]", &["room"]);
-    run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
-    for name in ["gt", "grey"] {
-        run(&mut baseline(name, &folder.join("dataset"), &folder.join(name))).ends_with(0);
-        let result = folder.join(name).with_extension("json");
-        run(&mut score_without_lpips(&folder.join(name), &folder.join("dataset"), &result)).ends_with(0);
-    }
-    folder
+    run(&mut build(&recipe, &dataset)).ends_with(0);
+    let scored = |name: &str| {
+        let submission = folder.join(name);
+        run(&mut baseline(name, &dataset, &submission)).ends_with(0);
+        let mut command = score(&submission, &dataset, &submission.with_extension("json"));
+        run(command.env("MATEVAL_CACHE", submission.join("no-such-folder"))).ends_with(0)
+    };
+    scored("gt");
+    let run_of_grey = scored("grey");
+    Scored { folder, run_of_grey }
 });
 
 /// The dataset, or the submission `grey` or `gt`.
 pub fn scored(name: &str) -> PathBuf {
-    SCORED.join(name)
+    SCORED.folder.join(name)
 }
 
 /// The result of `grey` or `gt`.
 pub fn result(method: &str) -> PathBuf {
-    SCORED.join(method).with_extension("json")
-}
-
-fn score_without_lpips(submission: &Path, dataset: &Path, result: &Path) -> std::process::Command {
-    let mut command = score(submission, dataset, result);
-    command.env("MATEVAL_CACHE", submission.join("no-such-folder"));
-    command
+    scored(method).with_extension("json")
 }
 
 fn summary(method: &str, protocol: &str) -> Value {
@@ -89,7 +93,7 @@ fn grey_scores_its_pinned_values() {
 /// Computes the error of a picture of one colour from the files alone.
 #[test]
 fn greys_error_is_that_of_one_colour() {
-    let room = SCORED.join("dataset/scenes/room");
+    let room = scored("dataset/scenes/room");
     let albedo = exr_io::read_linear(&room.join("ground_truth/views/input/albedo.exr")).unwrap();
     let valid = png_io::read_mask(&room.join("views/input/valid.png")).unwrap();
     let error_of = |byte: u8| {
@@ -144,10 +148,8 @@ fn tables_show_both_and_refuse_other_fingerprints() {
 #[test]
 fn lpips_without_weights_is_missing_and_names_the_fix() {
     const FIX: &str = "mateval fetch lpips";
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("RESULT.json");
-    let mut command = score(&SCORED.join("grey"), &SCORED.join("dataset"), &out);
-    run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0).says("lpips_alex is missing").says(FIX);
+    SCORED.run_of_grey.clone().says("lpips_alex is missing").says(FIX);
+    let out = result("grey");
     let result = json(&out);
     assert_eq!(result["missing"][0]["metric"], "lpips_alex");
     assert_eq!(result["missing"][0]["fix"], FIX);
@@ -165,7 +167,7 @@ fn lpips_without_weights_is_missing_and_names_the_fix() {
 fn lpips_with_weights_is_scored() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("RESULT.json");
-    run(&mut score(&SCORED.join("grey"), &SCORED.join("dataset"), &out)).ends_with(0);
+    run(&mut score_under(&["mateval-3"], &scored("grey"), &scored("dataset"), &out)).ends_with(0);
     let result = json(&out);
     let missing = result["missing"].as_array().unwrap();
     if let Some(lpips) = missing.iter().find(|missing| missing["metric"] == "lpips_alex") {
@@ -184,8 +186,8 @@ fn lpips_with_weights_is_scored() {
         distances.len() >= 10
             && distances.iter().all(|value| (value * 1e6).fract().min(1.0 - (value * 1e6).fract()) < 1e-6)
     );
-    let without = json(&SCORED.join("grey.json"));
+    let without = json(&self::result("grey"));
     assert_ne!(ours["fingerprint"], without["protocols"]["mateval-3"]["fingerprint"]);
-    let refused = run(mateval().args(["eval", "tables"]).args([&out, &SCORED.join("gt.json")]));
+    let refused = run(mateval().args(["eval", "tables"]).args([&out, &self::result("gt")]));
     refused.ends_with(2).says("different fingerprints");
 }
