@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Picture, exr_io, png_io};
-use mateval_testkit::kept_folder;
+use mateval_testkit::{copy_folder, kept_folder};
 use serde_json::{Value, json};
 
 use super::command::{baseline, build, mateval, render, run, run_words, verify};
@@ -33,12 +33,14 @@ fn source(folder: &Path, photo_line: &str, others: &[&str]) -> PathBuf {
 
 const PHOTO: &str = "photo = \"photo.png\"";
 
-/// A folder with the dataset `mixed`, of a scene with a photo and one without, and `alone`, of the former.
+/// A folder with the dataset `mixed`, of a scene with a photo and one without, `alone`, of the former, and
+/// `mixed-unrendered` and `alone-unrendered`, copies of both without renders.
 static BUILT: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("photo");
     for (name, others) in [("mixed", &["plain"][..]), ("alone", &[])] {
         let place = folder.join(format!("of-{name}"));
         run(&mut build(&source(&place, PHOTO, others), &folder.join(name))).ends_with(0);
+        copy_folder(&folder.join(name), &folder.join(format!("{name}-unrendered")));
         run(&mut render(&folder.join(name), 4)).ends_with(0).says("photographed: not rendered");
         run(&mut verify(&folder.join(name))).ends_with(0);
     }
@@ -86,8 +88,7 @@ fn a_larger_photo_of_linear_light_is_reduced() {
 #[test]
 fn the_other_scenes_still_need_renders() {
     let folder = kept_folder("photo_unrendered");
-    let unrendered = folder.join("dataset");
-    run(&mut build(&source(&folder, PHOTO, &["plain"]), &unrendered)).ends_with(0);
+    let unrendered = dataset("mixed-unrendered");
     let words = ["prep", "export", "--as", "huggingface", "--out"].map(PathBuf::from);
     run_words(words.into_iter().chain([folder.join("export"), unrendered.clone()])).ends_with(2).says("prep render");
     let missing = result_of(&unrendered)["missing"].clone();
@@ -110,7 +111,7 @@ fn pictures_of_light_are_those_of_the_other_scenes() {
 #[test]
 fn a_changed_photo_is_found() {
     let twin = kept_folder("photo_changed").join("dataset");
-    mateval_testkit::copy_folder(&dataset("alone"), &twin);
+    copy_folder(&dataset("alone"), &twin);
     let folder = twin.join("scenes/photographed");
     exr_io::write_linear(
         &folder.join("views/input/rgb.exr"),
