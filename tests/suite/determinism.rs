@@ -25,7 +25,8 @@ fn a_second_build_and_render_give_the_same_manifest() {
 #[test]
 fn a_build_from_kept_atlases_is_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let recipe = write_source(&folder.path().join("source"), SMALL, &["room"]);
+    let head = "resolution = [32, 24]\natlas_size = 64\nviews = []";
+    let recipe = write_source(&folder.path().join("source"), head, &["room"]);
     let cache = folder.path().join("cache");
     let build_again = |name: &str| {
         let dataset = folder.path().join(name);
@@ -47,7 +48,8 @@ fn a_build_from_kept_atlases_is_the_same() {
 #[test]
 fn another_recipe_and_other_samples_give_another_manifest() {
     let folder = tempfile::tempdir().unwrap();
-    let recipe = write_source(&folder.path().join("source"), "resolution = [96, 71]\natlas_size = 128", &["room"]);
+    let head = "resolution = [96, 71]\natlas_size = 64\nviews = []";
+    let recipe = write_source(&folder.path().join("source"), head, &["room"]);
     let dataset = folder.path().join("dataset");
     run(&mut build(&recipe, &dataset)).ends_with(0);
     let depth = |text: &str| text.lines().find(|line| line.ends_with("views/input/depth.exr")).unwrap().to_owned();
