@@ -38,11 +38,13 @@ fn rooms() -> Vec<Value> {
     json(&SURVEYED.survey.join("survey.json"))["houses"][0]["rooms"].as_array().unwrap().clone()
 }
 
-/// The recipe of the survey with small atlases.
-fn recipe(folder: &Path) -> PathBuf {
+/// The recipe of the survey with these lines in place of its resolution.
+fn recipe(folder: &Path, lines: &str) -> PathBuf {
+    const RESOLUTION: &str = "resolution = [96, 72]";
     let text = std::fs::read_to_string(SURVEYED.survey.join("recipe.toml")).unwrap();
+    assert!(text.contains(RESOLUTION), "{text}");
     let path = folder.join("recipe.toml");
-    std::fs::write(&path, text.replacen("\n\n", "\natlas_size = 256\n\n", 1)).unwrap();
+    std::fs::write(&path, text.replacen(RESOLUTION, lines, 1)).unwrap();
     path
 }
 
@@ -153,7 +155,8 @@ fn a_list_rejects_with_its_reason_and_a_survey_is_reproducible_to_the_byte() {
 fn accepted_rooms_become_a_dataset_that_can_be_scored() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = folder.path().join("dataset");
-    build_from(&recipe(folder.path()), &SURVEYED.source, &dataset).ends_with(0);
+    let recipe = recipe(folder.path(), "resolution = [96, 72]\natlas_size = 256");
+    build_from(&recipe, &SURVEYED.source, &dataset).ends_with(0);
     run(&mut verify(&dataset)).ends_with(0);
     let counted = run(stats(&dataset).args(["--format", "json"])).ends_with(0);
     let counted: Value = serde_json::from_str(&counted.stdout).unwrap();
@@ -175,7 +178,7 @@ fn a_recipe_refuses_files_that_are_not_those_it_pins() {
     let folder = tempfile::tempdir().unwrap();
     let (source, dataset) = (folder.path().join("source"), folder.path().join("dataset"));
     copy_folder(&SURVEYED.source, &source);
-    let recipe = recipe(folder.path());
+    let recipe = recipe(folder.path(), "resolution = [32, 24]\natlas_size = 64\nviews = []");
     let model = "house/3D-FUTURE-model/cc0f0000-5a3b-4e00-8000-000000000001/raw_model.obj";
     let mut text = std::fs::read_to_string(source.join(model)).unwrap();
     text.push_str("# one remark more\n");
@@ -260,7 +263,7 @@ fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
     // In a hand-written recipe, paths below the source are made relative to it and others are refused.
     let text = std::fs::read_to_string(&recipe).unwrap();
     let first = text.find("[scene.inputs]").unwrap();
-    let absolute = format!("atlas_size = 256\nviews = []\n{}", &text[..first])
+    let absolute = format!("atlas_size = 64\nviews = []\n{}", &text[..first])
         .replace("models = \"3D-FUTURE-model\"", &format!("models = {models:?}"));
     assert!(absolute.contains(models.to_str().unwrap()), "{absolute}");
     std::fs::write(&recipe, &absolute).unwrap();
@@ -301,7 +304,7 @@ fn many_rooms_print_a_screen() {
     std::fs::remove_file(source.join("house/3D-FUTURE-model/model_info.json")).unwrap();
     let recipe = source.join("recipe.toml");
     let text = std::fs::read_to_string(&recipe).unwrap();
-    let small = text.replace("resolution = [320, 240]", "resolution = [32, 24]\natlas_size = 64");
+    let small = text.replace("resolution = [320, 240]", "resolution = [32, 24]\natlas_size = 64\nviews = []");
     std::fs::write(&recipe, small).unwrap();
     let built = run(&mut build(&recipe, &dataset)).ends_with(0).prints("13 scenes");
     let lines: Vec<&str> = built.stderr.lines().filter(|line| line.contains('[')).collect();
