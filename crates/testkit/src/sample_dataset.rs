@@ -60,6 +60,11 @@ pub fn built() -> PathBuf {
     build_in("dataset", "")
 }
 
+/// Builds the dataset without renders and with the input views alone.
+pub fn built_with_input_views() -> PathBuf {
+    build_in("input_views", "views = []\n")
+}
+
 /// Builds the dataset without renders and with one view from another place in each scene.
 pub fn built_with_wide_views() -> PathBuf {
     build_in("wide_dataset", "wide = { count = 1, distance_m = [0.3, 0.3] }\n")

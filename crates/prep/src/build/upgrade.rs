@@ -155,6 +155,7 @@ fn format_of(bytes: &[u8]) -> Option<String> {
 mod tests {
     use std::collections::BTreeMap;
     use std::path::PathBuf;
+    use std::sync::LazyLock;
 
     use mateval_dataset::open::Dataset;
     use mateval_testkit::sample_dataset;
@@ -183,10 +184,9 @@ mod tests {
         replace(&path, &known, &sha256);
     }
 
-    /// A rendered dataset of this format, and the same one as the previous version wrote it.
-    fn both_formats() -> (PathBuf, PathBuf) {
-        let new = kept_folder("up_to_date").join("dataset");
-        copy_folder(&sample_dataset::built(), &new);
+    /// A rendered dataset of this format, and the same one as the previous version wrote it. Tests only read them.
+    static BOTH_FORMATS: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
+        let new = sample_dataset::built_with_input_views();
         render(&new, &RenderOptions { samples: Some(1), ..RenderOptions::default() }, &|_| ()).unwrap();
         let old = new.with_file_name("previous");
         copy_folder(&new, &old);
@@ -207,36 +207,43 @@ mod tests {
             std::fs::write(companions.join("companions.json"), r#"{"format": "mateval-companions/2"}"#).unwrap();
         }
         list_again(&old);
-        (new, old)
+        [new, old]
+    });
+
+    /// A copy of a dataset that a test may change.
+    fn copied(root: &Path) -> PathBuf {
+        let copy = kept_folder("up_to_date").join("dataset");
+        copy_folder(root, &copy);
+        copy
     }
 
     #[test]
     fn the_previous_format_becomes_this_one_byte_for_byte() {
-        let (new, old) = both_formats();
-        let error = Dataset::open(&old).unwrap_err().to_string();
+        let [new, old] = &*BOTH_FORMATS;
+        let error = Dataset::open(old).unwrap_err().to_string();
         assert!(error.contains("mateval prep render --only scorer DATASET"), "{error}");
         // Another version's list of hashes must not be needed.
-        let whole = old.with_file_name("whole");
-        copy_folder(&old, &whole);
+        let whole = copied(old);
         std::fs::remove_dir_all(whole.join(".build")).unwrap();
         assert!(bring_up_to_date(&whole, &|_| ()).unwrap());
-        assert_eq!(hashes(&whole), hashes(&new));
+        assert_eq!(hashes(&whole), hashes(new));
         assert!(!bring_up_to_date(&whole, &|_| ()).unwrap(), "nothing is left to do");
         Dataset::open(&whole).unwrap();
 
         // A run that was killed between two files of a scene.
-        let scene = Dataset::open(&new).unwrap().scenes[1].id.clone();
+        let old = copied(old);
+        let scene = Dataset::open(new).unwrap().scenes[1].id.clone();
         let scene_file = SceneFolder::of(&old, &scene).scene_file();
         SceneHashes::open(&old, &scene).unwrap().note_change().unwrap();
         raise_file(&scene_file).unwrap();
         raise_file(&old.join(TARGETS)).unwrap();
         assert!(bring_up_to_date(&old, &|_| ()).unwrap());
-        assert_eq!(hashes(&old), hashes(&new));
+        assert_eq!(hashes(&old), hashes(new));
     }
 
     #[test]
     fn a_changed_file_is_refused() {
-        let (_, old) = both_formats();
+        let old = copied(&BOTH_FORMATS[1]);
         let dataset: serde_json::Value = json::read(&old.join(DATASET)).unwrap();
         let picture = format!("scenes/{}/views/input/depth.exr", dataset["scenes"][0].as_str().unwrap());
         std::fs::write(old.join(&picture), "changed").unwrap();
