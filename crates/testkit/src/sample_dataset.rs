@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
+pub use mateval_baselines::bounds;
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
-use mateval_baselines::{bounds, submission};
+use mateval_baselines::submission;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::SurfaceIndex;
@@ -31,6 +32,12 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     let out = built();
     render(&out, &RenderOptions::default(), &|_| ()).unwrap();
     add_references(&out, 32);
+    Dataset::open(&out).unwrap()
+});
+
+static PHOTOS: LazyLock<Dataset> = LazyLock::new(|| {
+    let out = built_with_input_views();
+    render(&out, &RenderOptions::default(), &|_| ()).unwrap();
     Dataset::open(&out).unwrap()
 });
 
@@ -97,6 +104,12 @@ pub fn dataset() -> &'static Dataset {
     &DATASET
 }
 
+/// The dataset with the same photos, but without other views and without the scorer's references: enough for what looks
+/// at photos and computes no score; tests must not write to it.
+pub fn photos() -> &'static Dataset {
+    &PHOTOS
+}
+
 /// Writes the submission `gt`.
 pub fn write_truth(out: &Path) {
     bounds::write_truth(dataset(), out, false).unwrap();
@@ -107,23 +120,23 @@ pub fn write_grey(out: &Path) {
     bounds::write_grey(dataset(), out, false).unwrap();
 }
 
-/// Writes the truth of the photo lifted to the atlases, the rest by nearest neighbours.
+/// Writes the truth of each photo lifted to the atlases of [`photos`], the rest by nearest neighbours.
 pub fn write_nearest(out: &Path) {
     write_lifted(out, &EstimateSource::Truth);
 }
 
-/// Writes the photo itself, lifted to the atlases.
+/// Writes each photo itself, lifted to the atlases of [`photos`].
 pub fn write_from_photo(out: &Path) {
     write_lifted(out, &EstimateSource::Input);
 }
 
 fn write_lifted(out: &Path, source: &EstimateSource) {
-    nn::write(dataset(), out, false, source, &NnOptions::default(), &|_| ()).unwrap();
+    nn::write(photos(), out, false, source, &NnOptions::default(), &|_| ()).unwrap();
 }
 
-/// Makes the base colour of a scene's atlases black where the input view does not show them.
+/// Makes the base colour of a scene's atlases black where the input view of [`photos`] does not show them.
 pub fn blacken_unobserved(scene: &SceneFile, folder: &Path) {
-    let source = dataset().folder(&scene.id);
+    let source = photos().folder(&scene.id);
     let world = World::new(Arc::new(reference::read(&source).unwrap())).unwrap();
     for (at, node) in glb::read(&source.instances()).unwrap().into_iter().enumerate() {
         let path = folder.join(&node.name).join("base_color.png");

@@ -12,7 +12,7 @@ use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_submission::lint::{LintFile, LintPlan, lint};
-use mateval_testkit::sample_dataset::{dataset, write_from_photo, write_grey, write_nearest, write_truth};
+use mateval_testkit::sample_dataset::{bounds, photos, write_from_photo, write_nearest};
 
 use super::maps::{chunk, exr_header, insert, layer, layer_of, png, replace, rows};
 
@@ -37,6 +37,11 @@ fn every(submission: &Path, name: &str) -> Vec<PathBuf> {
     files
 }
 
+/// Writes the submission `gt`.
+pub fn write_truth(out: &Path) {
+    bounds::write_truth(photos(), out, false).unwrap();
+}
+
 fn good() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_truth(&folder.path().join("gt"));
@@ -44,7 +49,7 @@ fn good() -> tempfile::TempDir {
 }
 
 fn linted(submission: &Path) -> LintFile {
-    let plan = LintPlan { dataset: dataset(), submission, tool: "test".to_owned() };
+    let plan = LintPlan { dataset: photos(), submission, tool: "test".to_owned() };
     lint(&plan, &|_| ()).unwrap()
 }
 
@@ -120,7 +125,7 @@ fn baselines_are_not_accused() {
     let file = linted(&nn);
     assert_eq!((codes(&file, ERROR), codes(&file, WARNING)), (BTreeSet::new(), BTreeSet::new()), "{file:?}");
     let grey = folder.path().join("grey");
-    write_grey(&grey);
+    bounds::write_grey(photos(), &grey, false).unwrap();
     let file = linted(&grey);
     assert_eq!(codes(&file, ERROR), BTreeSet::new());
     assert!(codes(&file, WARNING).contains("same_base_color"), "{file:?}");
@@ -130,7 +135,7 @@ fn baselines_are_not_accused() {
 #[test]
 fn a_public_dataset_is_enough() {
     let (folder, public) = (good(), tempfile::tempdir().unwrap());
-    copy_public(&dataset().root, public.path());
+    copy_public(&photos().root, public.path());
     let opened = mateval_dataset::open::Dataset::open(public.path()).unwrap();
     let submission = folder.path().join("gt");
     let look =
@@ -529,7 +534,7 @@ const PICTURE_FAULTS: &[Fault] = &[
 /// Makes texels black that the input view does not show.
 fn empty_unobserved(root: &Path) {
     instead(root, write_nearest);
-    for scene in &dataset().scenes {
+    for scene in &photos().scenes {
         mateval_testkit::sample_dataset::blacken_unobserved(scene, &root.join("scenes").join(scene.id.as_str()));
     }
 }

@@ -20,10 +20,10 @@ use mateval_submission::files::SubmittedFile;
 use mateval_submission::lint::{LintPlan, lint};
 use mateval_submission::map_file::{MapFile, decode};
 use mateval_submission::prediction::{PredictedScene, read_scene};
-use mateval_testkit::sample_dataset::{dataset, write_truth};
+use mateval_testkit::sample_dataset::photos;
 use proptest::prelude::*;
 
-use super::lint::copy_public;
+use super::lint::{copy_public, write_truth};
 
 /// Decodes a map of an instance whose atlas has no uv, so that every texel counts.
 fn decoded(file: SubmittedFile, map: Map) -> Result<MapFile, FileFault> {
@@ -191,7 +191,7 @@ proptest! {
 }
 
 fn room() -> &'static SceneFile {
-    dataset().scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap()
+    photos().scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap()
 }
 
 /// `gt` with the maps of every instance of the room written as EXR, each texel `value(instance, x, y, side)` in all channels
@@ -225,13 +225,13 @@ fn submission(folder: &tempfile::TempDir) -> PathBuf {
 }
 
 fn read(submission: &Path) -> PredictedScene {
-    read_scene(submission, room(), &AtlasMeshes::on_demand(dataset(), room())).unwrap()
+    read_scene(submission, room(), &AtlasMeshes::on_demand(photos(), room())).unwrap()
 }
 
 /// The texels of each atlas from which a lookup in a triangle is at most a texel away, by the rasteriser that bakes the
 /// truth.
 fn owners() -> Vec<Vec<bool>> {
-    let nodes = glb::read(&dataset().folder(&room().id).instances()).unwrap();
+    let nodes = glb::read(&photos().folder(&room().id).instances()).unwrap();
     let owned = |(node, side): (glb::GlbNode, usize)| {
         let atlas = UvAtlas::new(&node.mesh, side);
         (0..side * side).map(|at| atlas.owner(at % side, at / side).is_some()).collect()
@@ -285,7 +285,7 @@ fn lint_reports_what_scoring_reports() {
     let read = read(&submission(&folder));
     let scored: Vec<Finding> = read.findings.into_iter().filter(|finding| finding.code == "bad_texels").collect();
     assert!(scored.len() > 20 && scored.iter().all(|finding| finding.severity == Severity::Warning), "{scored:?}");
-    let plan = LintPlan { dataset: dataset(), submission: &submission(&folder), tool: "test".to_owned() };
+    let plan = LintPlan { dataset: photos(), submission: &submission(&folder), tool: "test".to_owned() };
     let file = lint(&plan, &|_| ()).unwrap();
     let folded = file.findings.iter().find(|finding| finding.code == "bad_texels").unwrap();
     let sorted = |mut all: Vec<Finding>| {
@@ -314,7 +314,7 @@ fn maps_are_the_same_for_any_number_of_threads() {
 #[test]
 fn atlases_are_read_for_bad_texels_only() {
     let public = tempfile::tempdir().unwrap();
-    copy_public(&dataset().root, public.path());
+    copy_public(&photos().root, public.path());
     let opened = Dataset::open(public.path()).unwrap();
     std::fs::write(opened.folder(&room().id).instances(), "glTF").unwrap();
     let read =
