@@ -1,12 +1,13 @@
 //! Tests on whole scenes, built here, with and without faults, and on real ones from the shared data.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use mateval_dataset::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
 use mateval_dataset::reference::{Emission, EmissionMap, SurfaceIndex};
 use mateval_dataset::{Severity, obj};
 use mateval_image::{LinearRgb, Picture, Texels, exr_io};
-use mateval_testkit::shared_data;
+use mateval_testkit::{kept_folder, shared_data};
 use proptest::prelude::*;
 
 use super::*;
@@ -21,15 +22,26 @@ fn write_png(path: &Path) {
     mateval_image::png_io::write_rgb_bytes(path, &picture).unwrap();
 }
 
+fn write_scene(folder: &Path, xml: &str) {
+    std::fs::write(folder.join("scene.xml"), xml).unwrap();
+    std::fs::create_dir(folder.join("models")).unwrap();
+    std::fs::write(folder.join("models/a b.obj"), TRIANGLE).unwrap();
+    std::fs::write(folder.join("plain.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    write_png(&folder.join("a b.png"));
+    let bytes = Picture::from_fn(2, 1, |x, _| LinearRgb([55.0 * x as f32, 200.0, 9.0]));
+    exr_io::write_linear(&folder.join("bytes.exr"), &bytes, exr_io::Precision::Float).unwrap();
+}
+
 fn folder_with(xml: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.xml"), xml).unwrap();
-    std::fs::create_dir(folder.path().join("models")).unwrap();
-    std::fs::write(folder.path().join("models/a b.obj"), TRIANGLE).unwrap();
-    std::fs::write(folder.path().join("plain.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-    write_png(&folder.path().join("a b.png"));
-    let bytes = Picture::from_fn(2, 1, |x, _| LinearRgb([55.0 * x as f32, 200.0, 9.0]));
-    exr_io::write_linear(&folder.path().join("bytes.exr"), &bytes, exr_io::Precision::Float).unwrap();
+    write_scene(folder.path(), xml);
+    folder
+}
+
+/// A folder for all cases of a test, which run one after the other.
+fn kept_folder_with(xml: &str) -> PathBuf {
+    let folder = kept_folder("bitterli");
+    write_scene(&folder, xml);
     folder
 }
 
@@ -569,8 +581,8 @@ proptest! {
         changes in prop::collection::vec((any::<usize>(), any::<u8>()), 0..6),
         cut in prop_oneof![3 => Just(0_usize), 1 => any::<usize>()],
     ) {
-        let folder = folder_with("");
-        let path = folder.path().join("scene.xml");
+        static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| kept_folder_with(""));
+        let path = FOLDER.join("scene.xml");
         std::fs::write(&path, mutated(SCENE.as_bytes(), &changes, cut)).unwrap();
         let _ = read(&path, None, &Limits { triangles: 10_000, ..Limits::default() });
     }
@@ -578,8 +590,11 @@ proptest! {
     /// Words of the format in any order, which a change of single bytes would rarely produce.
     #[test]
     fn shuffled_xml_never_panics(words in prop::collection::vec(0_usize..WORDS.len(), 0..40)) {
+        static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| kept_folder_with(""));
         let body: String = words.iter().map(|&word| WORDS[word]).collect();
-        let _ = read_xml(&format!("<scene version='3.0.0'>{SENSOR}{body}</scene>"));
+        let path = FOLDER.join("scene.xml");
+        std::fs::write(&path, format!("<scene version='3.0.0'>{SENSOR}{body}</scene>")).unwrap();
+        let _ = read(&path, None, &Limits::default());
     }
 
     #[test]
@@ -587,12 +602,12 @@ proptest! {
         changes in prop::collection::vec((any::<usize>(), any::<u8>()), 0..8),
         cut in prop_oneof![3 => Just(0_usize), 1 => any::<usize>()],
     ) {
-        let xml = format!(
-            "<scene version='0.6.0'>{SENSOR}<shape type='obj'><string name='filename' value='models/a b.obj'/></shape></scene>"
-        );
-        let folder = folder_with(&xml);
-        std::fs::write(folder.path().join("models/a b.obj"), mutated(TRIANGLE.as_bytes(), &changes, cut)).unwrap();
-        let scene = read(&folder.path().join("scene.xml"), None, &Limits::default()).unwrap();
+        static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
+            let shape = "<shape type='obj'><string name='filename' value='models/a b.obj'/></shape>";
+            kept_folder_with(&format!("<scene version='0.6.0'>{SENSOR}{shape}</scene>"))
+        });
+        std::fs::write(FOLDER.join("models/a b.obj"), mutated(TRIANGLE.as_bytes(), &changes, cut)).unwrap();
+        let scene = read(&FOLDER.join("scene.xml"), None, &Limits::default()).unwrap();
         for surface in &scene.scene.surfaces {
             let count = surface.mesh.positions.len();
             prop_assert!(surface.mesh.triangles.iter().flatten().all(|&v| (v as usize) < count));
