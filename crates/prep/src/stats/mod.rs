@@ -569,7 +569,7 @@ mod tests {
     /// The size of a chart is limited, however many and long the names are. It states how many rows it left out.
     #[test]
     fn the_size_of_a_chart_is_limited() {
-        let long = "m".repeat(1 << 16);
+        let long = "m".repeat(1 << 10);
         let names: Vec<String> = (0..1000).map(|at| format!("{at} {long}")).collect();
         let things: Vec<Thing<'_>> =
             names.iter().map(|name| (Role::Furniture {}, Some("Sofa"), Some(name.as_str()), true)).collect();
