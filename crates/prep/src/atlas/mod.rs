@@ -214,12 +214,12 @@ mod tests {
     /// The wish of a camera close to a wall.
     #[test]
     fn a_wish_beyond_the_largest_atlas_gets_the_largest() {
-        for mesh in [cuboid(Vec3::new(4.0, 2.6, 0.1)), cells(40, 1.0, 1.0), cells(200, 2.0, 0.01), hoop(64, 0.01)] {
-            for texel_m in [1e-5, 1e-12] {
-                let unwrapped = unwrap(&mesh, SizeWish::Texel(texel_m)).unwrap();
-                assert_eq!(unwrapped.size, 4096);
-                assert!(unwrapped.texel_m > texel_m);
-            }
+        let wall = || cuboid(Vec3::new(4.0, 2.6, 0.1));
+        let extreme = [wall(), cells(40, 1.0, 1.0), cells(200, 2.0, 0.01), hoop(64, 0.01)].map(|mesh| (mesh, 1e-12));
+        for (mesh, texel_m) in extreme.into_iter().chain([(wall(), 1e-5)]) {
+            let unwrapped = unwrap(&mesh, SizeWish::Texel(texel_m)).unwrap();
+            assert_eq!(unwrapped.size, 4096);
+            assert!(unwrapped.texel_m > texel_m);
         }
     }
 
