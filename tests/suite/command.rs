@@ -86,6 +86,13 @@ pub fn render_for_scores(dataset: &Path, samples: u32, references: u32) -> Comma
     command
 }
 
+/// The photos alone, for what computes no score under light.
+pub fn render_photos(dataset: &Path, samples: u32) -> Command {
+    let mut command = render(dataset, samples);
+    command.args(["--only", "photo"]);
+    command
+}
+
 /// `mateval prep verify DATASET --format json`.
 pub fn verify(dataset: &Path) -> Command {
     let mut command = mateval();

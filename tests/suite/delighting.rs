@@ -10,7 +10,7 @@ use mateval_metrics::alignment::{channel_scales, scaled};
 use mateval_metrics::{Psnr, mse};
 use mateval_testkit::kept_folder;
 
-use super::command::{Run, baseline, build, render, run};
+use super::command::{Run, baseline, build, render_photos, run};
 use super::lifting::base_colors;
 use super::sample::{files_below, json, write_source};
 
@@ -19,7 +19,7 @@ static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("delighting");
     let recipe = write_source(&folder.join("source"), "resolution = [96, 72]\natlas_size = 64\nviews = []", &["room"]);
     run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
-    run(&mut render(&folder.join("dataset"), 64)).ends_with(0);
+    run(&mut render_photos(&folder.join("dataset"), 64)).ends_with(0);
     folder.join("dataset")
 });
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mateval_image::{LinearRgb, Picture, exr_io};
 
 use super::blender::blender;
-use super::command::{build, render, run};
+use super::command::{build, render_photos, run};
 use super::sample::{json, recipe_text, write_source};
 
 const HEAD: &str = "resolution = [96, 72]\natlas_size = 64\nviews = []";
@@ -89,7 +89,7 @@ fn weighted_truth_agrees_with_a_render_of_that_lighting() {
         std::fs::write(&xml, change(&std::fs::read_to_string(&xml).unwrap())).unwrap();
         let dataset = folder.path().join(name);
         run(&mut build(&recipe, &dataset)).ends_with(0);
-        let mut command = render(&dataset, SAMPLES);
+        let mut command = render_photos(&dataset, SAMPLES);
         run(command.args(["--renderer", "blender", "--blender"]).arg(&python)).ends_with(0);
         dataset.join("scenes").join(name)
     };
