@@ -2,7 +2,8 @@
 //!
 //! A row states everything about its metric: results, tables, boards and section 3 of `dataset_spec/PROTOCOL.md` follow
 //! from it. Squared errors alone are computed elsewhere: of maps by [`crate::materials::score`], of light by
-//! [`crate::light::mse`]. A new metric is a file of the crate `metrics`, a row here, and that section again, which a test of [`crate::protocol`] writes.
+//! [`crate::light::mse`]. A new metric is a file of the crate `metrics`, a row here, and that section again, which a
+//! test of [`crate::protocol`] writes.
 
 use mateval_dataset::submission::Map;
 use mateval_dataset::word_enum;

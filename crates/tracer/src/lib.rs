@@ -14,7 +14,7 @@
 //! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
 //! 4. The material at that place becomes a BSDF ([`bsdf`]); [`emitter`] samples a light; the BSDF samples the next ray.
 //! 5. [`render`](mod@render) averages the samples of each tile in a fixed order.
-//! 6. [`noise_filter`] takes the noise out of a picture that people, SSIM or LPIPS see.
+//! 6. [`noise_filter`] takes the noise out of pictures that people, SSIM or LPIPS see, and out of the pivots of errors.
 //!
 //! Every machine computes the same bits: trigonometric functions come from the `libm` crate, or are sums and products
 //! in `sampling`.

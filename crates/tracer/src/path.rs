@@ -68,7 +68,8 @@ impl RenderSettings {
     }
 }
 
-/// Supplies BSDFs for `K` material variants. Variants differ in base colour alone, so that one path serves all of them.
+/// Supplies BSDFs for `K` material variants, which one path serves: they differ in base colour, and at most two pairs of
+/// roughness and metallic share their densities.
 pub(crate) trait MaterialSource<'w, const K: usize>: Copy {
     /// Prefetches the memory that [`Self::prefetch_texels`] reads for `hit`.
     fn prefetch(self, hit: &Hit);

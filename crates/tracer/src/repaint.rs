@@ -169,8 +169,8 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
 /// prediction.
 ///
 /// Up to eight predictions share their paths. The bytes of each render are the same as if its prediction were rendered
-/// alone. Fails as [`crate::render_views`] does, if `repaint` was made for another world, or if mixes do not match
-/// predictions and lights.
+/// alone, or with the same second scattering alone. Fails as [`crate::render_views`] does, if `repaint` was made for
+/// another world, or if mixes do not match predictions and lights.
 pub fn render_repainted(
     world: &World,
     repaint: &Repaint,

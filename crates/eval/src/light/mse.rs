@@ -2,12 +2,12 @@
 //!
 //! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the
 //! encoded difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is
-//! the squared true difference, whatever the noise. Each half consists of two quarters. Half of their difference, encoded
-//! as X (or Y) is, has the half's noise and nothing else: u (or v). With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the
-//! expectation of (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, whatever the distribution of the noise, if
-//! quarters are independent: of the squares d x, d y and x y that make the variance, the first two terms count x y
-//! twice, the last takes it away once. Where few large contributions make it small or negative, half of the first two
-//! terms counts, which in expectation is at least half of the variance.
+//! the squared true difference, whatever the noise of the paths. Each half consists of two quarters. Half of their
+//! difference, encoded as X (or Y) is, has the half's noise and nothing else: u (or v). With X = d + x and Y = d + y,
+//! X*Y - d² = d (x + y) + x y, and the expectation of (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, whatever
+//! the distribution of the noise, if quarters are independent: of the squares d x, d y and x y that make the variance,
+//! the first two terms count x y twice, the last takes it away once. Where few large contributions make it small or
+//! negative, half of the first two terms counts, which in expectation is at least half of the variance.
 //!
 //! Pixels whose noise is correlated form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)): all
 //! sums are taken within blocks, and variances are added over them. Three effects are left out, being small where they
