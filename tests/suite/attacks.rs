@@ -69,10 +69,11 @@ impl Rooms {
 
     /// The PSNR of albedo in the novel views, in dB, and that without its scale.
     fn psnrs(&self, submission: &Path, dataset: &str) -> [f64; 2] {
-        let result = tempfile::tempdir().unwrap();
-        let path = result.path().join("result.json");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.json");
         run(&mut score(submission, &self.path(dataset), &path)).ends_with(0);
-        ["albedo", "albedo_aligned"].map(|picture| psnr_of(&json(&path), picture))
+        let result = json(&path);
+        ["albedo", "albedo_aligned"].map(|picture| psnr_of(&result, picture))
     }
 
     fn psnr(&self, submission: &Path, dataset: &str) -> f64 {
@@ -222,8 +223,8 @@ fn remembered_textures_fall_below_the_medians() {
     assert!(gains[0] > 0.2 && gains[1] < 0.05, "gains by fitted memory: {gains:?}; {all}");
 }
 
-/// The same in a room of 3D-FRONT. Undressed it is white all over, the one case in which `delight` is right about the
-/// brightness of base colours. So its fall says nothing of memory, and scores without scale are compared.
+/// The same in a room of 3D-FRONT. `delight` is right about the brightness of its white walls and wrong about that of
+/// the redressed ones. This fall has nothing to do with memory, so scores without scale are compared.
 #[test]
 fn remembered_textures_fall_in_a_real_room() {
     let Some(rooms) = &*REAL else { return };
@@ -240,7 +241,7 @@ fn remembered_textures_fall_in_a_real_room() {
         assert!(undressed[0] > undressed[1].max(undressed[2]) && redressed[0] < redressed[2], "{all}");
     }
     assert!(nn[0][1] - nn[1][1] < (memory[0][1] - memory[1][1]) / 3.0, "{all}");
-    // Memory that is fitted to what `nn` sees has its error in brightness, and no more than that of its colours.
+    // Memory that is fitted to what `nn` sees is as wrong about brightness as `nn`, and knows less of the colours.
     let fitted = rooms.psnrs(&recolored(rooms, "public", false), "redressed_scored");
     assert!(fitted[0] < nn[1][0] + 0.1 && fitted[1] < nn[1][1] - 3.0, "fitted memory: {fitted:?}; {all}");
 }

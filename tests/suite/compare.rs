@@ -401,8 +401,8 @@ fn a_moved_piece_is_found() {
     let moved = &mut scene.surfaces[usize::from(piece) - 1].mesh;
     moved.positions.iter_mut().for_each(|position| *position += 0.03 * right.as_vec3());
     // Silhouettes do not depend on samples.
-    write_twin(dataset, scene, &views[..1], 1);
-    let file = found(dataset, 1, 1);
+    write_twin(dataset, scene, &views[..1], FEW_SAMPLES);
+    let file = found(dataset, FEW_SAMPLES, 1);
     check_holds(&faults(&file, "input"), &["silhouette EqualShare"]);
     assert_eq!(faults(&file, "up_left"), [""; 0]);
 }

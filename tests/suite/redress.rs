@@ -43,25 +43,16 @@ fn made(folder: &Path, name: &str, redress: &str) {
     run(&mut build(&recipe, &folder.join(name))).ends_with(0);
 }
 
-/// A recipe of both scenes.
 fn recipe(folder: &Path, redress: &str) -> PathBuf {
+    let path = folder.join("source/redress.toml");
     let room = "house = \"house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json\", room = \"LivingDiningRoom-101\", \
                 models = \"house/3D-FUTURE-model\", textures = \"house/3D-FRONT-texture\", appearance = \"stated\"";
-    let living =
-        format!("[[scene]]\nid = \"living\"\nfront3d = {{ {room} }}\ncamera = {{ designer = 0 }}\n{redress}\n");
-    recipe_of(folder, &format!("{living}{}", room_scene(redress)))
-}
-
-/// The scene `room` of a recipe.
-fn room_scene(redress: &str) -> String {
-    format!("[[scene]]\nid = \"room\"\nbitterli = \"room/scene.xml\"\n{redress}\n")
-}
-
-fn recipe_of(folder: &Path, scenes: &str) -> PathBuf {
-    let path = folder.join("source/redress.toml");
-    let head = "name = \"redress\"\nresolution = [64, 48]\natlas_size = 128\nviews = []\n\
-                licences = { front3d = \"CC0-1.0\" }\n";
-    std::fs::write(&path, format!("{head}{scenes}")).unwrap();
+    let text = format!(
+        "name = \"redress\"\nresolution = [64, 48]\natlas_size = 128\nviews = []\nlicences = {{ front3d = \"CC0-1.0\" }}\n\
+         [[scene]]\nid = \"living\"\nfront3d = {{ {room} }}\ncamera = {{ designer = 0 }}\n{redress}\n\
+         [[scene]]\nid = \"room\"\nbitterli = \"room/scene.xml\"\n{redress}\n"
+    );
+    std::fs::write(&path, text).unwrap();
     path
 }
 
@@ -173,9 +164,9 @@ fn every_source_has_its_licence() {
 
 #[test]
 fn materials_come_from_the_folder_and_are_not_named() {
-    let dataset = BUILT.join("tiles");
-    let room = room_scene("redress = { key = \"../key\", materials = \"../materials\" }");
-    run(&mut build(&recipe_of(&BUILT, &room), &dataset)).ends_with(0);
+    let name = "tiles";
+    made(&BUILT, name, "redress = { key = \"../key\", materials = \"../materials\" }");
+    let dataset = BUILT.join(name);
     for file in files_below(&dataset) {
         let bytes = std::fs::read(dataset.join(&file)).unwrap();
         assert!(!bytes.windows(8).any(|window| window == b"Secretum"), "{}", file.display());

@@ -17,16 +17,14 @@ use super::sample::{json, write_source};
 const HEAD: &str = "resolution = [64, 48]\natlas_size = 128\nviews = [{ id = \"up_left\", x_deg = 5, y_deg = 5 }]\n";
 const WIDE: &str = "wide = { count = 3, distance_m = [0.3, 0.9] }\n";
 
-/// A folder with the dataset `wide`, and `plain` without wide views, with the results of `nn` on both and of `gt` on
-/// `wide`.
+/// A folder with the dataset `wide`, and `plain` without wide views, each with its results `gt.json` and `nn.json`.
 static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("wide_views");
-    for (name, wide, methods) in [("plain", "", &["nn"][..]), ("wide", WIDE, &["gt", "nn"])] {
-        let head = format!("{HEAD}{wide}");
+    for (name, head) in [("plain", HEAD.to_owned()), ("wide", format!("{HEAD}{WIDE}"))] {
         let dataset = folder.join(name);
         run(&mut build(&write_source(&folder.join(format!("source-{name}")), &head, &["room"]), &dataset)).ends_with(0);
         run(&mut render_for_scores(&dataset, 8, 16)).ends_with(0);
-        for method in methods {
+        for method in ["gt", "nn"] {
             let submission = folder.join(format!("{name}-{method}"));
             run(&mut baseline(method, &dataset, &submission)).ends_with(0);
             let words =
@@ -136,17 +134,20 @@ fn unobserved_pixels_are_those_that_no_line_reaches() {
 /// The numbers of input and turned views do not know of wide views; the twin, another pass of the same views, does.
 #[test]
 fn other_views_score_what_they_did() {
-    let [plain, wide] = ["plain-nn", "wide-nn"].map(|name| result(name)["protocols"]["mateval-3"].clone());
-    let [plain, wide] = [&plain["summary"], &wide["summary"]].map(|summary| summary.as_object().unwrap());
-    let mut compared = 0;
-    for (key, value) in plain {
-        assert_eq!(value, &wide[key], "{key}");
-        compared += 1;
+    for method in ["gt", "nn"] {
+        let [plain, wide] =
+            ["plain", "wide"].map(|name| result(&format!("{name}-{method}"))["protocols"]["mateval-3"].clone());
+        let [plain, wide] = [&plain["summary"], &wide["summary"]].map(|summary| summary.as_object().unwrap());
+        let mut compared = 0;
+        for (key, value) in plain {
+            assert_eq!(value, &wide[key], "{method} {key}");
+            compared += 1;
+        }
+        assert!(compared > 40, "{compared}");
+        let of_wide = wide.keys().filter(|key| key.contains(".wide")).count();
+        assert_eq!(wide.len() - of_wide, compared);
+        assert!(of_wide > 10, "{of_wide}");
     }
-    assert!(compared > 40, "{compared}");
-    let of_wide = wide.keys().filter(|key| key.contains(".wide")).count();
-    assert_eq!(wide.len() - of_wide, compared);
-    assert!(of_wide > 10, "{of_wide}");
 }
 
 /// What the input view shows is all that `nn` knows, so it falls; the truth does not.

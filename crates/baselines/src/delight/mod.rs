@@ -282,7 +282,7 @@ fn towards_parts(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::{Arc, LazyLock};
+    use std::sync::Arc;
 
     use glam::Vec2;
     use mateval_dataset::material::{
@@ -440,19 +440,9 @@ mod tests {
         [0, 1, 2].map(|c| colors.iter().map(|color| color[c]).sum::<f32>() / colors.len() as f32)
     }
 
-    fn delit(room: &PartRoom) -> DelitPhoto {
-        run(room, &DelightOptions { samples: [4, 4, 16], ..DelightOptions::default() }, &|_| ()).unwrap()
+    fn delit(planted: &Planted) -> DelitPhoto {
+        run(&planted.room, &DelightOptions { samples: [4, 4, 16], ..DelightOptions::default() }, &|_| ()).unwrap()
     }
-
-    /// The room of a seed, and its photo without its light.
-    fn planted_and_delit(seed: u64) -> (Planted, DelitPhoto) {
-        let planted = planted(seed, 64);
-        let found = delit(&planted.room);
-        (planted, found)
-    }
-
-    /// The room of seed 1, which two tests use.
-    static ROOM_1: LazyLock<(Planted, DelitPhoto)> = LazyLock::new(|| planted_and_delit(1));
 
     /// PSNR over valid pixels of sRGB values, each channel at the linear scale that fits the truth best.
     fn aligned_psnr(found: &Picture<LinearRgb>, planted: &Planted) -> f64 {
@@ -506,16 +496,10 @@ mod tests {
     fn planted_rooms_are_delit() {
         let (mut gains, mut errors) = (Vec::new(), Vec::new());
         for seed in 0..12 {
-            let other;
-            let (planted, found) = match seed {
-                1 => &*ROOM_1,
-                _ => {
-                    other = planted_and_delit(seed);
-                    &other
-                }
-            };
-            gains.push(gain(found, planted));
-            let shares = shares(planted);
+            let planted = planted(seed, 64);
+            let found = delit(&planted);
+            gains.push(gain(&found, &planted));
+            let shares = shares(&planted);
             for (k, radiance) in planted.radiances.iter().enumerate().filter(|(k, _)| shares[*k] >= LEAST_SHARE) {
                 let ratios = [0, 1, 2].map(|c| found.lights[k].radiance[c] / f64::from(radiance[c]));
                 errors.push((ratios.iter().sum::<f64>() / 3.0 - 1.0).abs());
@@ -529,16 +513,16 @@ mod tests {
     /// Lamps that the photo shows are taken as they are shown; the base colour is then no worse than with fitted ones.
     #[test]
     fn shown_radiances_are_kept() {
-        let (planted, fitted) = &*ROOM_1;
-        let fitted = gain(fitted, planted);
-        let shown = planted.radiances.iter().map(|radiance| Some(radiance.map(f64::from))).collect();
-        let found = delit(&PartRoom { shown, ..planted.room.clone() });
+        let mut planted = planted(1, 64);
+        let fitted = gain(&delit(&planted), &planted);
+        planted.room.shown = planted.radiances.iter().map(|radiance| Some(radiance.map(f64::from))).collect();
+        let found = delit(&planted);
         for (k, radiance) in planted.radiances.iter().enumerate() {
             let found = &found.lights[k].radiance;
             let near = found.iter().zip(radiance).all(|(found, shown)| (found / f64::from(*shown) - 1.0).abs() < 0.1);
             assert!(near, "lamp {k}: {found:?} {radiance:?}");
         }
-        let known = gain(&found, planted);
+        let known = gain(&found, &planted);
         assert!(known >= fitted - 0.3, "{known} {fitted}");
     }
 

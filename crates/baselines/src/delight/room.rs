@@ -34,7 +34,6 @@ const LEAST_PIXELS: usize = 20;
 
 /// A room whose surfaces are the parts of its instances, without glass and with everything that may be a light, and its
 /// photo.
-#[derive(Clone)]
 pub(super) struct PartRoom {
     pub(super) world: World,
     /// In the order of the world's light groups.
