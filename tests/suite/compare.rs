@@ -121,7 +121,7 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
                 exr_io::write_linear(&folder.join(format!("{name}{suffix}.exr")), picture, Precision::Float).unwrap();
             }
         };
-        let [a, b] = [&light.halves[0], &light.halves[1]];
+        let [a, b] = [&light.by_seed[0], &light.by_seed[1]];
         write("rgb", &a.sum(), &b.sum());
         for (at, (a, b)) in a.pictures().iter().zip(b.pictures()).enumerate() {
             write(&format!("group_{at:02}"), a, b);

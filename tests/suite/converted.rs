@@ -67,9 +67,9 @@ fn the_maps_describe_a_surface_completely() {
     let painted = render_repainted(&world, &repaint, &cameras, Lighting::Apart, &settings, &seeds, &none).unwrap();
     let rendered = |world: &World| {
         let render = render_views(world, &cameras, &settings, &seeds, &none).unwrap();
-        render.views[0].halves[0].sum()
+        render.views[0].by_seed[0].sum()
     };
-    let (painted, true_picture) = (painted[0].views[0].halves[0].sum(), rendered(&world));
+    let (painted, true_picture) = (painted[0].views[0].by_seed[0].sum(), rendered(&world));
     let found = off(&painted, &true_picture);
 
     let source = reference::read_source_materials(&folder, materials.len()).unwrap().unwrap();

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! SAMPLES per pixel of each half are those of the protocol if 0; REFERENCE_SAMPLES are those of the run that stands for the
-//! exact value. Prints a row for each submission and number: the mean PSNR over seeds, its bias, its spread,
-//! and the stated error divided by the spread.
+//! exact value. Prints a row for each submission and number of light: its mean over seeds, its bias, its spread, and, of
+//! PSNR, the stated error divided by the spread.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "measurements are printed")]
 
@@ -18,8 +18,10 @@ use mateval_dataset::open::Dataset;
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ProtocolResult;
-use mateval_eval::result::key::{Surfaces, Views};
+use mateval_eval::result::key::{ResultKey, Surfaces, Views};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_metrics::{Lpips, Net};
+use mateval_testkit::lpips_weights;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
@@ -33,10 +35,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut protocol = Protocol::named("mateval-3")?;
         protocol.light.samples.seed = seed.to_owned();
         if samples > 0 {
-            (protocol.light.samples.least, protocol.light.samples.most) = (samples, samples);
+            protocol.light.samples.each_half = samples;
         }
         let submissions = submissions.iter().map(Path::new).collect();
-        let lpips = LpipsWeights::Missing { reason: "not measured".to_owned(), fix: String::new() };
+        let lpips = match lpips_weights(Net::Alex.file_name()) {
+            Some(weights) => LpipsWeights::Loaded(Box::new(Lpips::load(Net::Alex, &weights)?)),
+            None => LpipsWeights::Missing { reason: "not measured".to_owned(), fix: String::new() },
+        };
         let plan = ScorePlan::new(&dataset, submissions, vec![protocol], lpips, "spread");
         let plan = ScorePlan { scenes: vec![scene.clone()], ..plan };
         let results = score(&plan, &|_| ())?;
@@ -50,9 +55,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     eprintln!("reference");
     let reference = numbers(&scored("reference", exact)?);
     let mut ratios: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    println!("submission               number                       PSNR     bias    spread  stated/spread");
+    println!("submission               number                       mean      bias    spread  stated/spread");
     for (key, exact) in &reference {
-        let values: Vec<f64> = all.iter().filter_map(|run| run.get(key)).map(|value| value.psnr).collect();
+        let values: Vec<f64> = all.iter().filter_map(|run| run.get(key)).map(|value| value.mean).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
         let spread = (squares / (values.len() as f64 - 1.0)).sqrt();
@@ -60,9 +65,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             all.iter().filter_map(|run| run.get(key)).map(|value| value.error).sum::<f64>() / values.len() as f64;
         let (submission, number) = key;
         let name = &submissions[*submission];
-        let bias = mean - exact.psnr;
-        println!("{name:24} {number:25} {mean:7.2} {bias:+8.3} {spread:9.4} {:8.2}", stated / spread);
-        if spread > 0.0 {
+        let bias = mean - exact.mean;
+        println!("{name:24} {number:27} {mean:8.4} {bias:+8.4} {spread:9.4} {:8.2}", stated / spread);
+        if spread > 0.0 && stated > 0.0 {
             ratios.entry(name).or_default().push(stated / spread);
         }
     }
@@ -73,10 +78,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A PSNR and its stated error, in dB.
+/// A number and, of PSNR, its stated error.
 #[derive(Clone, Copy, Default)]
 struct Value {
-    psnr: f64,
+    mean: f64,
     error: f64,
 }
 
@@ -84,15 +89,20 @@ struct Value {
 fn numbers(results: &[ProtocolResult]) -> BTreeMap<(usize, String), Value> {
     let mut all = BTreeMap::new();
     for (submission, result) in results.iter().enumerate() {
-        for (key, error) in &result.summary_noise {
-            all.insert((submission, key.to_string()), Value { psnr: result.summary[key], error: *error });
+        let has_noise =
+            |key: &ResultKey| key.picture.kind.is_light() && !matches!(key.metric, Metric::Mse | Metric::Psnr);
+        for (key, mean) in &result.summary {
+            let error = result.summary_noise.get(key).copied();
+            if error.is_some() || has_noise(key) {
+                all.insert((submission, key.to_string()), Value { mean: *mean, error: error.unwrap_or_default() });
+            }
         }
         for picture in result.pictures.iter().filter(|picture| picture.picture.surfaces == Surfaces::All) {
             let (Some(lighting), Views::Input) = (picture.lighting, picture.key(Metric::Psnr).views) else { continue };
             let [mse, psnr] = [Metric::Mse, Metric::Psnr].map(|metric| picture.values.get(&metric).copied());
             if let (Some(mse), Some(psnr), Some(error)) = (mse, psnr, picture.mse_error) {
                 let error = 10.0 / std::f64::consts::LN_10 * error / mse.max(1.645 * error);
-                all.insert((submission, format!("{lighting}.input")), Value { psnr, error });
+                all.insert((submission, format!("{lighting}.input")), Value { mean: psnr, error });
             }
         }
     }

@@ -10,22 +10,18 @@
 //!
 //! Two passes over the texels: the means, from which the scales of aligned answers follow; then everything else.
 
+use mateval_dataset::Progress;
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::layout::INPUT;
 use mateval_dataset::lighting::LightingName;
-use mateval_dataset::reference::SurfaceIndex;
-use mateval_dataset::{Progress, Report};
 use mateval_image::{LUMINANCE, LinearRgb, Texture};
 use mateval_metrics::color_difference;
 use mateval_submission::prediction::PredictedScene;
 use mateval_submission::texel_map::TexelMap;
-use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::materials::texels::{checked_size, value};
+use crate::materials::texels::each_atlas;
 use crate::open_scene::OpenScene;
 use crate::result::constancy::{Constancy, Deviation, PartSpread};
-use crate::truth::true_material;
 
 /// The answers to a family: those to the scene first, then those to its twins.
 pub(crate) struct Family<'a> {
@@ -38,8 +34,10 @@ impl Family<'_> {
     /// Compares the answers. Absent where the input view shows no texel.
     pub(crate) fn constancy(&self, open: &OpenScene, progress: Progress<'_>) -> Result<Option<Constancy>, EvalError> {
         let mut means = Means::default();
-        self.each_instance(open, "means", progress, |map, answers, _| {
-            means.add(&sums_of_rows(map, |y| Means::of_row(map, answers, y)));
+        each_atlas(open, self.scene, "constancy, means", progress, |at, map, _| {
+            let answers = self.answers(at);
+            means.add(&map.of_rows(|y| Means::of_row(map, &answers, y)));
+            Ok(())
         })?;
         if means.area_m2 == 0.0 {
             return Ok(None);
@@ -48,8 +46,10 @@ impl Family<'_> {
         let passes = [unit, means.scales()];
         let centre = means.of_family();
         let mut sums = Sums::default();
-        self.each_instance(open, "deviations", progress, |map, answers, truth| {
-            sums.add(&sums_of_rows(map, |y| Sums::of_row(map, answers, truth, &passes, centre, y)));
+        each_atlas(open, self.scene, "constancy, deviations", progress, |at, map, truth| {
+            let answers = self.answers(at);
+            sums.add(&map.of_rows(|y| Sums::of_row(map, &answers, &truth.base_color, &passes, centre, y)));
+            Ok(())
         })?;
         let members = self.members.len() as f64;
         let [raw, aligned] = sums.passes.map(|pass| pass.deviation(means.area_m2, members));
@@ -64,35 +64,11 @@ impl Family<'_> {
         }))
     }
 
-    /// Calls `work` with the texels of each instance, the family's base colours and the true one.
-    fn each_instance(
-        &self,
-        open: &OpenScene,
-        step: &str,
-        progress: Progress<'_>,
-        mut work: impl FnMut(&TexelMap, &[&Texture], &Texture),
-    ) -> Result<(), EvalError> {
-        let input = self.scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&self.scene.id))?;
-        for (at, instance) in self.scene.instances.iter().enumerate() {
-            let Some(size) = checked_size(&open.folder, instance)? else { continue };
-            progress(Report::step(&format!("constancy of {}: {step}", self.scene.id), at, self.scene.instances.len()));
-            let map = TexelMap::new(&open.world, SurfaceIndex(at), &open.atlases[at], size, &input.camera);
-            let truth = true_material(&open.folder, &instance.id, size)?.base_color;
-            // Every answer has a material, if only the default, for an instance with an atlas.
-            let answers: Vec<&Texture> = self
-                .members
-                .iter()
-                .filter_map(|member| member.materials[at].as_ref().map(|material| &material.base_color))
-                .collect();
-            work(&map, &answers, &truth);
-        }
-        Ok(())
+    /// The base colours of an instance that has an atlas, for which every answer has a material, if only the default.
+    fn answers(&self, instance: usize) -> Vec<&Texture> {
+        let materials = self.members.iter().filter_map(|member| member.materials[instance].as_ref());
+        materials.map(|material| &material.base_color).collect()
     }
-}
-
-/// The sums of all rows from the top, so that the number of threads changes no bit.
-fn sums_of_rows<T: Send>(map: &TexelMap, row: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-    (0..map.size()).into_par_iter().map(row).collect()
 }
 
 /// Sums over texels, weighted by area.
@@ -109,7 +85,7 @@ impl Means {
         for texel in map.row(y).filter(|texel| texel.observed) {
             sums.area_m2 += texel.area_m2;
             for (sum, texture) in sums.colors.iter_mut().zip(answers) {
-                let color = value(map.size(), texture, &texel, y);
+                let color = map.value(texture, &texel, y);
                 (0..3).for_each(|c| sum[c] += texel.area_m2 * f64::from(color[c]));
             }
         }
@@ -192,7 +168,7 @@ impl Sums {
         for texel in map.row(y).filter(|texel| texel.observed) {
             let area = texel.area_m2;
             let colors: Vec<[f64; 3]> =
-                answers.iter().map(|texture| value(map.size(), texture, &texel, y).map(f64::from)).collect();
+                answers.iter().map(|texture| map.value(texture, &texel, y).map(f64::from)).collect();
             for (at, (pass, scales)) in sums.passes.iter_mut().zip(passes).enumerate() {
                 let scaled = || colors.iter().zip(scales).map(|(color, scale)| [0, 1, 2].map(|c| color[c] * scale[c]));
                 let mean = [0, 1, 2].map(|c| scaled().map(|color| color[c]).sum::<f64>() / answers.len() as f64);
@@ -207,7 +183,7 @@ impl Sums {
                 pass.luminance[1] += area * luminance;
                 pass.chroma[1] += area * chroma;
                 if at == 0 {
-                    let truth = value(map.size(), truth, &texel, y).map(f64::from);
+                    let truth = map.value(truth, &texel, y).map(f64::from);
                     sums.squared_error += area * (0..3).map(|c| (mean[c] - truth[c]).powi(2)).sum::<f64>() / 3.0;
                     sums.delta_e += area * color_difference(shown(mean), shown(truth));
                 }

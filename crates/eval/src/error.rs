@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::ids::quoted;
+use mateval_dataset::open::Dataset;
 use mateval_dataset::{SceneId, ViewId};
 use mateval_files::FileError;
 
@@ -86,9 +88,18 @@ pub enum EvalError {
 }
 
 impl EvalError {
+    /// The scene's reference cannot be used.
+    pub(crate) fn reference(dataset: &Dataset, scene: &SceneFile, what: impl Into<String>) -> Self {
+        let path = dataset.folder(&scene.id).scorer();
+        Self::Reference { dataset: dataset.root.clone(), scene: scene.id.clone(), path, what: what.into() }
+    }
+
     pub(crate) fn no_input_view(scene: &SceneId) -> Self {
-        let [expected, found] = ["an input view", "none"].map(str::to_owned);
-        Self::Unsound { place: format!("scene '{scene}'"), expected, found }
+        Self::unsound(format!("scene '{scene}'"), "an input view", "none")
+    }
+
+    pub(crate) fn unsound(place: String, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self::Unsound { place, expected: expected.into(), found: found.into() }
     }
 }
 

@@ -13,7 +13,7 @@
 //!    maps ([`light::reference`]). The true maps travel along the paths of every prediction (`light::shared_paths`,
 //!    [`light::own_lights`]), so that what few paths miss or exaggerate of both cancels: [`light::difference`] turns
 //!    four quarters into two estimates of the encoded difference from R, which are exactly zero for the true maps, and
-//!    [`light::mse`] states their noise. Protocol `paper` compares with the photo's renderer instead
+//!    [`light::mse`] states their noise; `light::score` makes PSNRs of them. Protocol `paper` compares with the photo's renderer instead
 //!    ([`light::fitted_lights`]).
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
@@ -23,7 +23,7 @@
 //! renders under fitted lights are compared with its photos.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
-//! ([`result::means`]): pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.
+//! ([`result::means`]) with their errors: pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.
 
 pub mod constancy;
 pub mod error;

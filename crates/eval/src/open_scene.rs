@@ -17,8 +17,7 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
     let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
     let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
     if views.is_empty() {
-        let [expected, found] = ["a view of it in targets.json", "none"].map(str::to_owned);
-        return Err(EvalError::Unsound { place: format!("scene '{}'", scene.id), expected, found });
+        return Err(EvalError::unsound(format!("scene '{}'", scene.id), "a view of it in targets.json", "none"));
     }
     Ok(views)
 }
@@ -48,7 +47,7 @@ pub struct OpenScene {
     pub folder: SceneFolder,
     /// Its true geometry, materials and lights, ready for ray tracing.
     pub world: World,
-    /// The meshes of `instances.glb`, one for each surface of the world.
+    /// The meshes of `instances.glb`, one with the same triangles for each surface of the world.
     pub atlases: Vec<TriangleMesh>,
 }
 
@@ -62,19 +61,12 @@ impl OpenScene {
         dataset.check_files(&scene.id, is_needed)?;
         let folder = dataset.folder(&scene.id);
         let world = World::new(Arc::new(reference::read(&folder)?))?;
-        let atlases = read_atlases(&folder, scene, &world)?;
-        Ok(Self { folder, world, atlases })
+        let atlases = reference::read_plain(&folder, scene)?.surfaces;
+        let triangles = |surface: &Surface| surface.mesh.triangles.len();
+        if !atlases.iter().map(triangles).eq(world.scene().surfaces.iter().map(triangles)) {
+            let what = "it does not fit ground_truth/reference/geometry.glb; run `mateval prep verify`".to_owned();
+            return Err(DatasetError::Unsupported { path: folder.instances(), what }.into());
+        }
+        Ok(Self { folder, world, atlases: atlases.into_iter().map(|surface| surface.mesh).collect() })
     }
-}
-
-/// The meshes of `instances.glb`, with the same triangles as the world's surfaces, or the dataset is unsound.
-fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
-    let atlases = reference::read_plain(folder, scene)?.surfaces;
-    let triangles = |surface: &Surface| surface.mesh.triangles.len();
-    if atlases.iter().map(triangles).eq(world.scene().surfaces.iter().map(triangles)) {
-        return Ok(atlases.into_iter().map(|surface| surface.mesh).collect());
-    }
-    let path = folder.instances();
-    let what = "it does not fit ground_truth/reference/geometry.glb; run `mateval prep verify`";
-    Err(DatasetError::Unsupported { path, what: what.to_owned() }.into())
 }

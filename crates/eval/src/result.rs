@@ -99,7 +99,7 @@ pub struct ProtocolResult {
     /// with a value has one in `noise`.
     pub summary_noise: BTreeMap<ResultKey, f64>,
     /// Standard errors of each scene's mean PSNR of light due to render noise, in dB, by the same keys. Left out where
-    /// the error of a picture may be noise alone.
+    /// a picture has `lower_bound`.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     /// By scene, the radiances that were fitted; only under `paper` and `capture-1`.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
@@ -218,7 +218,8 @@ pub struct PictureValues {
     /// The value of each metric; those are left out for which no pixel or window counts.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub values: BTreeMap<Metric, f64>,
-    /// Of light: the standard error of the MSE due to the noise of the prediction's own paths.
+    /// Of light: the standard error of the MSE due to noise of the paths of prediction and truth. The noise
+    /// of R, which `scorer.json` states, is not in it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mse_error: Option<f64>,
     /// The MSE was exactly zero, and its PSNR is the cap.

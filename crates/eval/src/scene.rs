@@ -2,25 +2,25 @@
 //! collected.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use mateval_dataset::dataset::{SceneFile, View};
-use mateval_dataset::layout::{INPUT, SceneFolder};
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::lighting::LightingName;
-use mateval_dataset::{Progress, RendererId, SceneId, TriangleMesh, ViewId};
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Progress, RendererId, SceneId, ViewId};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_fit::FittedRadiances;
+use mateval_metrics::pixel::pixel_count;
 use mateval_metrics::{Lpips, MetricError};
 use mateval_submission::prediction::PredictedScene;
-use mateval_tracer::World;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::light::difference::base_color_ratio;
-use crate::light::mse::LightMse;
+use crate::light::mse::{LightMse, mean_psnr_error};
 use crate::light::reference::StoredReference;
 use crate::metric::PictureKind;
-use crate::open_scene::ViewSet;
+use crate::open_scene::{OpenScene, ViewSet};
 use crate::pictures_dir::PicturesDir;
 use crate::protocol::Protocol;
 use crate::result::key::{PictureName, Region, ResultKey, Surfaces, Views};
@@ -30,11 +30,9 @@ use crate::truth::ViewTruth;
 /// The inputs for scoring all submissions in one set of views of a scene.
 #[derive(Clone)]
 pub(crate) struct SceneTask<'a> {
-    pub(crate) dataset: &'a Path,
+    pub(crate) dataset: &'a Dataset,
     pub(crate) scene: &'a SceneFile,
-    pub(crate) folder: &'a SceneFolder,
-    pub(crate) world: &'a World,
-    pub(crate) atlases: &'a [TriangleMesh],
+    pub(crate) open: &'a OpenScene,
     pub(crate) views: Vec<&'a View>,
     pub(crate) set: ViewSet,
     pub(crate) predictions: &'a [PredictedScene],
@@ -67,6 +65,8 @@ pub(crate) struct MaskedRegion {
     pub(crate) region: Region,
     pub(crate) surfaces: Surfaces,
     pub(crate) mask: Mask,
+    /// Of photos: the share of the region's pixels that do not count and are not in the mask; absent if it has none.
+    pub(crate) left_out: Option<f64>,
 }
 
 impl SceneTask<'_> {
@@ -77,7 +77,7 @@ impl SceneTask<'_> {
     }
 
     pub(crate) fn truths(&self) -> Result<Vec<ViewTruth>, EvalError> {
-        self.views.iter().map(|view| ViewTruth::read(self.folder, view)).collect()
+        self.views.iter().map(|view| ViewTruth::read(&self.open.folder, view)).collect()
     }
 
     pub(crate) fn input_view(&self) -> Result<&View, EvalError> {
@@ -98,21 +98,28 @@ impl SceneTask<'_> {
 
 /// The regions of a view over which metrics are computed: all valid pixels first.
 pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
-    let all = |region, mask: &Mask| MaskedRegion { region, surfaces: Surfaces::All, mask: mask.clone() };
-    let mut regions = vec![all(Region::Valid, &truth.valid)];
-    regions.extend(truth.unobserved.as_ref().map(|mask| all(Region::Unobserved, mask)));
-    regions.extend(truth.specular.as_ref().map(|mask| MaskedRegion {
-        region: Region::Valid,
-        surfaces: Surfaces::Specular,
-        mask: mask.clone(),
-    }));
-    regions
+    let all = [
+        (Region::Valid, Surfaces::All, Some(&truth.valid)),
+        (Region::Unobserved, Surfaces::All, truth.unobserved.as_ref()),
+        (Region::Valid, Surfaces::Specular, truth.specular.as_ref()),
+    ];
+    let masked = |(region, surfaces, mask): (_, _, Option<&Mask>)| {
+        Some(MaskedRegion { region, surfaces, mask: mask?.clone(), left_out: None })
+    };
+    all.into_iter().filter_map(masked).collect()
 }
 
 impl MaskedRegion {
     /// Whether it holds all valid pixels of its view, so that metrics with windows are taken over it.
     pub(crate) fn is_whole(&self) -> bool {
         (self.region, self.surfaces) == (Region::Valid, Surfaces::All)
+    }
+
+    /// The region without the pixels that are not `counted`.
+    pub(crate) fn narrowed(self, counted: &Mask) -> Self {
+        let mask = Mask::from_fn(counted.width(), counted.height(), |x, y| self.mask.get(x, y) && counted.get(x, y));
+        let [all, left] = [&self.mask, &mask].map(pixel_count);
+        Self { mask, left_out: (all > 0).then(|| 1.0 - left as f64 / all as f64), ..self }
     }
 
     /// A picture over this region, without values yet.
@@ -124,8 +131,9 @@ impl MaskedRegion {
         lighting: Option<LightingName>,
     ) -> PictureValues {
         let picture = PictureName { kind, surfaces: self.surfaces };
-        let pixels = mateval_metrics::pixel::pixel_count(&self.mask);
-        PictureValues { lighting, ..PictureValues::new(scene.clone(), view.clone(), picture, self.region, pixels) }
+        let (left_out, pixels) = (self.left_out, pixel_count(&self.mask));
+        let blank = PictureValues::new(scene.clone(), view.clone(), picture, self.region, pixels);
+        PictureValues { lighting, left_out, ..blank }
     }
 }
 
@@ -150,8 +158,21 @@ pub(crate) struct SceneScore {
 pub(crate) struct ScoreSheet {
     pub(crate) score: SceneScore,
     pub(crate) errors: InstanceErrors,
-    /// The errors of light by the mean that they count for.
-    pub(crate) light_errors: BTreeMap<ResultKey, Vec<LightMse>>,
+    /// The MSEs of light by the mean that they count for.
+    pub(crate) light_mses: BTreeMap<ResultKey, Vec<LightMse>>,
+}
+
+impl ScoreSheet {
+    /// States the noise of the scene's mean PSNRs, once all pictures have been measured. Where one is a lower bound, a
+    /// standard error would say nothing.
+    pub(crate) fn state_noise(&mut self) {
+        for (key, mses) in std::mem::take(&mut self.light_mses) {
+            if mses.iter().any(LightMse::is_lower_bound) {
+                continue;
+            }
+            self.score.noise.extend(mean_psnr_error(&mses).map(|error| (key, error)));
+        }
+    }
 }
 
 /// Sums of squared errors of a scene's pixels by picture, views and instance.
@@ -159,33 +180,28 @@ pub(crate) struct ScoreSheet {
 pub(crate) struct InstanceErrors(BTreeMap<(PictureKind, Views, u16), (f64, usize)>);
 
 impl InstanceErrors {
-    /// Adds `error(k)`, a mean over channels, of every valid pixel k of a view to the instance that it shows.
-    pub(crate) fn add(&mut self, picture: PictureKind, view: &ViewId, truth: &ViewTruth, error: impl Fn(usize) -> f64) {
-        let ViewTruth { instances, valid, unobserved, .. } = truth;
-        self.add_region(picture, Views::of(view, Region::Valid), instances, valid, &error);
-        if let Some(unobserved) = unobserved {
-            self.add_region(picture, Views::of(view, Region::Unobserved), instances, unobserved, &error);
-        }
-    }
-
-    fn add_region(
+    /// Adds `error(k)`, a mean over channels, of every pixel k of the view's regions on all surfaces to the instance that
+    /// it shows.
+    pub(crate) fn add(
         &mut self,
         picture: PictureKind,
-        views: Views,
+        view: &ViewId,
         instances: &Picture<u16>,
-        mask: &Mask,
-        error: &impl Fn(usize) -> f64,
+        regions: &[MaskedRegion],
+        error: impl Fn(usize) -> f64,
     ) {
-        let mut sums: BTreeMap<u16, (f64, usize)> = BTreeMap::new();
-        for (pixel, instance) in instances.pixels().iter().enumerate().filter(|(pixel, _)| mask.pixels()[*pixel]) {
-            let (sum, count) = sums.entry(*instance).or_default();
-            *sum += error(pixel);
-            *count += 1;
-        }
-        for (instance, (sum, count)) in sums {
-            let all = self.0.entry((picture, views, instance)).or_default();
-            all.0 += sum;
-            all.1 += count;
+        for MaskedRegion { region, mask, .. } in regions.iter().filter(|region| region.surfaces == Surfaces::All) {
+            let mut sums: BTreeMap<u16, (f64, usize)> = BTreeMap::new();
+            for (pixel, instance) in instances.pixels().iter().enumerate().filter(|(pixel, _)| mask.pixels()[*pixel]) {
+                let (sum, count) = sums.entry(*instance).or_default();
+                *sum += error(pixel);
+                *count += 1;
+            }
+            for (instance, (sum, count)) in sums {
+                let all = self.0.entry((picture, Views::of(view, *region), instance)).or_default();
+                all.0 += sum;
+                all.1 += count;
+            }
         }
     }
 

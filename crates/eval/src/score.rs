@@ -18,6 +18,8 @@ use mateval_metrics::Lpips;
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::files::{HashedFile, SubmissionJson, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::constancy::Family;
 use crate::error::EvalError;
@@ -183,7 +185,9 @@ fn score_or_recall(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'
         let (found, opened) = plan.open_and_score(scene, &chosen, progress)?;
         open = Some(opened);
         for (&at, found) in uncached.iter().zip(found) {
-            plan.write_cache(scene, &predictions[at], &found)?;
+            for (protocol, score) in plan.protocols.iter().zip(&found) {
+                plan.keep(&plan.score_key(scene, &predictions[at], protocol), score)?;
+            }
             scores[at] = Some(found);
         }
     }
@@ -240,12 +244,6 @@ impl Twins {
         (members.len() > 1 && members.iter().all(|member| !member.files.is_empty())).then_some(members)
     }
 
-    /// What the cache holds of the scene; absent if it holds nothing that can be read.
-    fn cached(plan: &ScorePlan<'_>, scene: &SceneFile, members: &[&PredictedScene]) -> Option<Option<Constancy>> {
-        let (cache, key) = (Cache::new(plan.cache?), plan.family_key(scene, members));
-        json::parse(&cache.path(&key), &cache.read(&key, MOST_CACHED_BYTES).ok()??).ok()
-    }
-
     /// Absent where there are no [`Self::members`]. The scene is opened if it is not yet.
     fn constancy(
         &self,
@@ -256,19 +254,17 @@ impl Twins {
         progress: Progress<'_>,
     ) -> Result<Option<Constancy>, EvalError> {
         let Some(members) = self.members(prediction) else { return Ok(None) };
-        if let Some(found) = Self::cached(plan, scene, &members) {
+        let key = plan.family_key(scene, &members);
+        if let Some(found) = plan.recall(&key) {
             return Ok(found);
         }
-        let key = plan.family_key(scene, &members);
         let open = match open {
             Some(open) => open,
             none => none.insert(OpenScene::read(plan.dataset, scene)?),
         };
         let lightings = self.answers.iter().map(|(lighting, _)| *lighting).collect();
         let found = Family { scene, lightings, members }.constancy(open, progress)?;
-        if let Some(cache) = plan.cache.map(Cache::new) {
-            cache.keep(&key, json::to_text(&found).as_bytes())?;
-        }
+        plan.keep(&key, &found)?;
         Ok(found)
     }
 }
@@ -315,7 +311,8 @@ impl<'a> ScorePlan<'a> {
                 let atlases = AtlasMeshes::on_demand(self.dataset, scene);
                 let prediction = read_scene(path, scene, &atlases)?;
                 let twins = Twins::read(self, path, scene, &atlases)?;
-                let is_unknown = |members: Vec<_>| Twins::cached(self, scene, &members).is_none();
+                let constancy = |members: Vec<_>| self.recall::<Option<Constancy>>(&self.family_key(scene, &members));
+                let is_unknown = |members| constancy(members).is_none();
                 if self.read_cached(scene, &prediction).is_none() || twins.members(&prediction).is_some_and(is_unknown)
                 {
                     of_submission.push(scene.id.clone());
@@ -328,6 +325,10 @@ impl<'a> ScorePlan<'a> {
         if missing.is_empty() { Ok(()) } else { Err(EvalError::NotCached { missing }) }
     }
 
+    fn has(&self, track: Track) -> bool {
+        self.protocols.iter().any(|protocol| protocol.light.tracks.contains(&track))
+    }
+
     /// The scores, and the scene that was opened for them.
     fn open_and_score(
         &self,
@@ -335,18 +336,12 @@ impl<'a> ScorePlan<'a> {
         predictions: &[PredictedScene],
         progress: Progress<'_>,
     ) -> Result<(Vec<Vec<SceneScore>>, OpenScene), EvalError> {
-        let has = |track| self.protocols.iter().any(|protocol| protocol.light.tracks.contains(&track));
-        let reference = if has(Track::True) { StoredReference::listed(self.dataset, scene)? } else { None };
+        let reference = if self.has(Track::True) { StoredReference::listed(self.dataset, scene)? } else { None };
         // A dataset that has references has them all: a scene without one would silently have no light.
-        if has(Track::True) && reference.is_none() && scene.photo.is_none() && has_references(self.dataset) {
-            return Err(EvalError::Reference {
-                dataset: self.dataset.root.clone(),
-                scene: scene.id.clone(),
-                path: self.dataset.folder(&scene.id).scorer(),
-                what: "it is missing".to_owned(),
-            });
+        if self.has(Track::True) && reference.is_none() && scene.photo.is_none() && has_references(self.dataset) {
+            return Err(EvalError::reference(self.dataset, scene, "it is missing"));
         }
-        let renderer = self.dataset.photo_renderer(scene).filter(|_| has(Track::Fitted));
+        let renderer = self.dataset.photo_renderer(scene).filter(|_| self.has(Track::Fitted));
         if let Some(renderer) = renderer {
             // Numbers carry the dataset's fingerprint, so the photos must be those that it covers.
             let folder = format!("ground_truth/renders/{renderer}/");
@@ -363,11 +358,9 @@ impl<'a> ScorePlan<'a> {
         let folders = |root| (0..self.submissions.len()).map(|at| folder_of(root, at)).collect();
         let pictures = self.pictures.map(|root| PicturesDir { folders: folders(root) });
         let scores = score_scene(&SceneTask {
-            dataset: &self.dataset.root,
+            dataset: self.dataset,
             scene,
-            folder: &open.folder,
-            world: &open.world,
-            atlases: &open.atlases,
+            open: &open,
             views: scored_views(self.dataset, scene)?,
             set: ViewSet::Turned,
             predictions,
@@ -400,27 +393,53 @@ impl<'a> ScorePlan<'a> {
 
     /// The scores that an earlier run wrote to the cache, if all of them can be read.
     fn read_cached(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
-        let cache = Cache::new(self.cache?);
-        let read = |protocol: &Protocol| {
-            let key = self.score_key(scene, prediction, protocol);
-            // A truncated or foreign file counts as missing.
-            json::parse(&cache.path(&key), &cache.read(&key, MOST_CACHED_BYTES).ok()??).ok()
-        };
-        self.protocols.iter().map(read).collect()
+        self.protocols.iter().map(|protocol| self.recall(&self.score_key(scene, prediction, protocol))).collect()
     }
 
-    fn write_cache(
-        &self,
-        scene: &SceneFile,
-        prediction: &PredictedScene,
-        scores: &[SceneScore],
-    ) -> Result<(), EvalError> {
-        let Some(cache) = self.cache.map(Cache::new) else { return Ok(()) };
-        for (protocol, score) in self.protocols.iter().zip(scores) {
-            cache.keep(&self.score_key(scene, prediction, protocol), json::to_text(score).as_bytes())?;
-        }
-        Ok(())
+    /// An entry of the cache. A truncated or foreign file counts as missing.
+    fn recall<T: DeserializeOwned>(&self, key: &Key) -> Option<T> {
+        let cache = Cache::new(self.cache?);
+        json::parse(&cache.path(key), &cache.read(key, MOST_CACHED_BYTES).ok()??).ok()
     }
+
+    fn keep(&self, key: &Key, found: &impl Serialize) -> Result<(), EvalError> {
+        let keep = |folder| Cache::new(folder).keep(key, json::to_text(found).as_bytes());
+        Ok(self.cache.map_or(Ok(()), keep)?)
+    }
+}
+
+/// Scores every submission under every protocol. Returns the scores by submission, then by protocol.
+fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> {
+    let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
+    let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
+    let scores = |at: usize| task.protocols[at].scores(task.scene);
+    let scoring: Vec<usize> = (0..task.protocols.len()).filter(|at| scores(*at)).collect();
+    if !scoring.is_empty() && !task.scene.source.kind.states_materials() {
+        task.score_measured(&scores, &mut sheets)?;
+        for &at in &scoring {
+            if let Some(rules) = &task.protocols[at].photos {
+                score_photos(task, rules, at, &mut sheets)?;
+            }
+        }
+    } else if !scoring.is_empty() {
+        for part in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.over(set)) {
+            let wanted = |at: usize| scores(at) && (part.set == ViewSet::Turned || task.protocols[at].wide_views);
+            if !(0..task.protocols.len()).any(wanted) {
+                continue;
+            }
+            let truths = part.truths()?;
+            let base_colors = part.score_materials(&truths, &wanted, &mut sheets)?;
+            for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
+                score_light(&part, &truths, &base_colors, at, &mut sheets)?;
+            }
+        }
+        task.score_texels(&mut sheets)?;
+    }
+    let finish = |mut sheet: ScoreSheet| {
+        sheet.state_noise();
+        SceneScore { instances: sheet.errors.finish(task.scene), ..sheet.score }
+    };
+    Ok(sheets.into_iter().map(|sheets| sheets.into_iter().map(finish).collect()).collect())
 }
 
 fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
@@ -594,52 +613,16 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
         });
     }
     if scored.iter().any(|scene| scene.photo.is_none()) {
-        let mut tracks: Vec<Track> = plan.protocols.iter().flat_map(|p| p.light.tracks.clone()).collect();
-        tracks.sort_unstable();
-        tracks.dedup();
-        tracks.retain(|track| match track {
-            Track::Fitted => plan.dataset.file.photo_renderer.is_none(),
-            _ => !has_references(plan.dataset),
-        });
-        missing.extend(tracks.into_iter().map(|track| MissingMetric {
+        let has_renders = |track: &Track| match track {
+            Track::Fitted => plan.dataset.file.photo_renderer.is_some(),
+            Track::True | Track::Relit => has_references(plan.dataset),
+        };
+        let tracks = [Track::Fitted, Track::True, Track::Relit].into_iter().filter(|track| plan.has(*track));
+        missing.extend(tracks.filter(|track| !has_renders(track)).map(|track| MissingMetric {
             metric: MissingNumbers::Picture(track.picture()),
             reason: "the dataset has no renders to compare with".to_owned(),
             fix: "mateval prep render DATASET".to_owned(),
         }));
     }
     missing
-}
-
-/// Scores every submission under every protocol. Returns the scores by submission, then by protocol.
-fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> {
-    let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
-    let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
-    let scores = |at: usize| task.protocols[at].scores(task.scene);
-    let scoring: Vec<usize> = (0..task.protocols.len()).filter(|at| scores(*at)).collect();
-    if !scoring.is_empty() && !task.scene.source.kind.states_materials() {
-        task.score_measured(&scores, &mut sheets)?;
-        for &at in &scoring {
-            if let Some(rules) = &task.protocols[at].photos {
-                score_photos(task, rules, at, &mut sheets)?;
-            }
-        }
-    } else if !scoring.is_empty() {
-        for part in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.over(set)) {
-            let wanted = |at: usize| scores(at) && (part.set == ViewSet::Turned || task.protocols[at].wide_views);
-            if !(0..task.protocols.len()).any(wanted) {
-                continue;
-            }
-            let truths = part.truths()?;
-            let base_colors = part.score_materials(&truths, &wanted, &mut sheets)?;
-            for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
-                score_light(&part, &truths, &base_colors, at, &mut sheets)?;
-            }
-        }
-        task.score_texels(&mut sheets)?;
-    }
-    let finish = |mut sheet: ScoreSheet| {
-        sheet.state_noise();
-        SceneScore { instances: sheet.errors.finish(task.scene), ..sheet.score }
-    };
-    Ok(sheets.into_iter().map(|sheets| sheets.into_iter().map(finish).collect()).collect())
 }

@@ -34,13 +34,13 @@ pub fn scene_albedo(
     submissions: &[&Path],
 ) -> Result<Vec<SceneAlbedo>, EvalError> {
     scene.check_materials_known()?;
-    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
-    let predictions = predictions_of(submissions, scene, &atlases)?;
+    let open = OpenScene::read(dataset, scene)?;
+    let predictions = predictions_of(submissions, scene, &open.atlases)?;
     let view = |view: &View| {
         let predictions: Vec<_> = predictions.iter().collect();
-        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions, Places::AsTruth);
+        let pictures = material_pictures(&open, &view.camera, &predictions, Places::AsTruth);
         let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
-        Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
+        Ok(SceneAlbedo { truth: ViewTruth::read(&open.folder, view)?, predicted })
     };
     scored_views(dataset, scene)?.into_iter().map(view).collect()
 }
@@ -74,15 +74,13 @@ pub fn scene_light(
     lighting: Option<LightingName>,
     progress: Progress<'_>,
 ) -> Result<Vec<SceneLight>, EvalError> {
-    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene)?;
-    let predictions = predictions_of(submissions, scene, &atlases)?;
+    let open = OpenScene::read(dataset, scene)?;
+    let predictions = predictions_of(submissions, scene, &open.atlases)?;
     let reference = StoredReference::listed(dataset, scene)?;
     let task = SceneTask {
-        dataset: &dataset.root,
+        dataset,
         scene,
-        folder: &folder,
-        world: &world,
-        atlases: &atlases,
+        open: &open,
         views: ViewSet::Turned.of(&scored_views(dataset, scene)?),
         set: ViewSet::Turned,
         predictions: &predictions,

@@ -69,16 +69,12 @@ pub fn photo_of_renderer(
 
 /// The picture; fails where it is not of the camera's size.
 pub(crate) fn sized<T: Copy>(view: &View, picture: Picture<T>) -> Result<Picture<T>, EvalError> {
-    let expected = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
-    let found = (picture.width(), picture.height());
-    if found == expected {
+    let (k, width, height) = (view.camera.intrinsics, picture.width(), picture.height());
+    if (width, height) == (k.width as usize, k.height as usize) {
         return Ok(picture);
     }
-    Err(EvalError::Unsound {
-        place: format!("view '{}'", view.id),
-        expected: format!("pictures of {}x{} pixels, the camera's size", expected.0, expected.1),
-        found: format!("{}x{}", found.0, found.1),
-    })
+    let expected = format!("pictures of {}x{} pixels, the camera's size", k.width, k.height);
+    Err(EvalError::unsound(format!("view '{}'", view.id), expected, format!("{width}x{height}")))
 }
 
 /// The true maps of an instance: its source's material baked to its atlas of `size` times `size` texels, with the
@@ -90,14 +86,12 @@ pub fn true_material(folder: &SceneFolder, instance: &InstanceId, size: usize) -
         let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
         let png = folder.truth_material(instance).join(map.stem()).with_extension("png");
         let texture = read_texture(&png, encoding, Wrap::Clamp)?;
-        if (texture.width(), texture.height()) == (size, size) {
+        let (width, height) = (texture.width(), texture.height());
+        if (width, height) == (size, size) {
             return Ok(texture.collapsed());
         }
-        Err(EvalError::Unsound {
-            place: format!("'{}'", png.display()),
-            expected: format!("{size}x{size} texels, as scene.json states"),
-            found: format!("{}x{}", texture.width(), texture.height()),
-        })
+        let expected = format!("{size}x{size} texels, as scene.json states");
+        Err(EvalError::unsound(format!("'{}'", png.display()), expected, format!("{width}x{height}")))
     };
     // A submission's constant scalar is one float.
     let compact = |map: Texture| if map.width() == 1 { one_texel(map.texel(0, 0)[0]) } else { map };

@@ -274,7 +274,7 @@ pub fn render<'py>(
         return Err(PyValueError::new_err(format!("samples: expected 1 to 4096, found {samples}")));
     }
     let mut protocol = Protocol::named("mateval-3").map_err(failed)?;
-    protocol.light.samples.fix(samples);
+    protocol.light.samples.each_half = samples;
     let listener = Listener::of(py, progress)?;
     let source = Arc::clone(&scene.source);
     let views = run_long(py, &listener, move |progress| {

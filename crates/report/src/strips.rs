@@ -140,7 +140,7 @@ pub(crate) fn rows(
         Shown::Light { track, samples } => {
             let mut protocol = Protocol::named(if track == Track::Fitted { "paper" } else { "mateval-3" })?;
             protocol.light.tracks = vec![track];
-            protocol.light.samples.fix(samples);
+            protocol.light.samples.each_half = samples;
             let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, None, progress)?;
             Ok(views.into_iter().map(light_row).collect())
         }

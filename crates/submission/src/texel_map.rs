@@ -5,6 +5,7 @@ use mateval_dataset::camera::Projection;
 use mateval_dataset::material::CUT_OUT_BELOW_OPACITY;
 use mateval_dataset::reference::SurfaceIndex;
 use mateval_dataset::{Camera, TriangleMesh};
+use mateval_image::Texture;
 use mateval_tracer::{Hit, Ray, World};
 use rayon::prelude::*;
 
@@ -77,6 +78,27 @@ impl TexelMap {
             area_m2: f64::from(texel.area_m2),
             observed: texel.observed,
         })
+    }
+
+    /// `row` of every row, from the top, so that sums over the rows have the same bits for any number of threads.
+    pub fn of_rows<T: Send>(&self, row: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..self.size).into_par_iter().map(row).collect()
+    }
+
+    /// What a texture of any size holds at the place of a texel in row `y`.
+    pub fn value(&self, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
+        match (texture.width(), texel.off_centre) {
+            (1, _) => texture.texel(0, 0),
+            (_, Some(uv)) => texture.sample(uv),
+            // The centre of its own texel: exactly, where a uv might be rounded.
+            (size, None) if size == self.size => texture.texel(texel.column, y),
+            _ => texture.sample(self.centre_uv(texel.column, y)),
+        }
+    }
+
+    fn centre_uv(&self, x: usize, y: usize) -> [f32; 2] {
+        let along = |at: usize| (at as f64 + 0.5) / self.size as f64;
+        [along(x) as f32, (1.0 - along(y)) as f32]
     }
 }
 

@@ -48,9 +48,9 @@ struct Light {
     variance: f32,
 }
 
-/// The mean of two independent halves, linear, with its noise filtered. Values may be negative. Pixels that are not
+/// The mean of two independent pictures, linear, with its noise filtered. Values may be negative. Pixels that are not
 /// valid are those of the mean. The pictures are as large as those of `surfaces`.
-pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) -> Picture<LinearRgb> {
+pub fn filtered_mean(pair: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) -> Picture<LinearRgb> {
     let (width, height) = (surfaces.valid.width(), surfaces.valid.height());
     let divisor = |k: usize| match surfaces.base_color {
         Some(base_color) => base_color.pixels()[k].0.map(|v| v.clamp(LEAST_BASE_COLOR, 1.0)),
@@ -58,7 +58,7 @@ pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) 
     };
     let divided = |k: usize| {
         let divisor = divisor(k);
-        let [a, b] = halves.map(|half| half.pixels()[k].0);
+        let [a, b] = pair.map(|picture| picture.pixels()[k].0);
         let value = [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]) / divisor[c]);
         let noise = luminance([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]) / divisor[c]));
         Light { value, variance: noise * noise }
@@ -80,7 +80,7 @@ pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) 
             let divisor = divisor(k);
             return LinearRgb([0, 1, 2].map(|c| divisor[c] * pixels[k].value[c]));
         }
-        let [a, b] = halves.map(|half| half.pixels()[k].0);
+        let [a, b] = pair.map(|picture| picture.pixels()[k].0);
         LinearRgb([0, 1, 2].map(|c| 0.5 * (a[c] + b[c])))
     })
 }

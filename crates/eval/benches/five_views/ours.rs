@@ -41,7 +41,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
     let photo = photo(folder);
     let (fit, stage) = Stage::measure("fit", 0, || {
         let target = FitTarget { photo: &photo, mask: None, exposure: 1.0 };
-        fit_lights(&FitRules::default(), &stream_c[0].halves[0], &target).unwrap()
+        fit_lights(&FitRules::default(), &stream_c[0].by_seed[0], &target).unwrap()
     });
     stages.push(stage);
     let mut errors: Vec<f64> = fit.weights.iter().flatten().map(|weight| (weight - 1.0).abs()).collect();
@@ -58,7 +58,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
         let (views, stage) = Stage::measure("two halves", samples, || {
             let views = render(cameras, samples / 2, &seeds);
             // The scored pictures; their noise is compared under the scene's own radiances.
-            let halves = views.iter().flat_map(|view| &view.halves);
+            let halves = views.iter().flat_map(|view| &view.by_seed);
             let scored: Vec<_> = halves.map(|half| half.weighted(&fit.weights).unwrap()).collect();
             std::hint::black_box(scored);
             views
@@ -70,7 +70,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
 }
 
 fn mean_of_halves(view: &ViewLight) -> Vec<f32> {
-    let [a, b] = [0, 1].map(|half| view.halves[half].sum());
+    let [a, b] = [0, 1].map(|half| view.by_seed[half].sum());
     let channels = |p: Picture<LinearRgb>| p.into_pixels().into_iter().flat_map(|pixel| pixel.0);
     channels(a).zip(channels(b)).map(|(a, b)| (a + b) / 2.0).collect()
 }

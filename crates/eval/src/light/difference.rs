@@ -2,7 +2,7 @@
 //!
 //! The prediction P and the truth T travel along the same paths, in four independent quarters: q_i is the mean of P in
 //! quarter i, t_i that of T, all linear and exposed. Quarters 1 and 2 form one half, 3 and 4 the other; for a half h, o
-//! is the other half.
+//! is the other half. f clips above 1 and encodes to sRGB, f' is its slope.
 //!
 //! ```text
 //! r   = (clip(a_P) + 0.001) / (a_T + 0.001), at most 8      a_P, a_T: base colour in the view, from the atlases of both
@@ -15,15 +15,14 @@
 //! X_h = f(p'_h) + s_h (m_h - p'_h) - f(R);   u_h = s_h times half the difference of the quarters
 //! ```
 //!
-//! r R is what the prediction would show if light between surfaces did not change; b is r where that takes away more
-//! noise than it brings in (a factor above 1 would enlarge the truth's noise), and g R the part of r R that the filter
-//! need not carry, bounded because r is large only where the truth is dark and R's own noise would be enlarged with it.
-//! f clips above 1 and encodes to sRGB, f' is its slope. Encoding is a curve, so the mean of encoded noise is not the
-//! encoded mean. Here the curve is replaced by its tangent at a pivot p that half h does not know: X_h is linear in
-//! m_h, and its mean is the encoded mean as far as the pivot is right. m_i is a control variate (Owen, "Monte Carlo
-//! theory, methods and examples", section 8.9) that moves no expectation, whatever r is, as
-//! far as R is the mean of t. For the true maps q = t and r
-//! = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of paths.
+//! r R is what the prediction would show if light between surfaces did not change. b is r, but at most 1, since a larger
+//! factor would enlarge the truth's noise; g R is the part of r R that the filter need not carry, bounded because r is
+//! large only where the truth is dark, and R's own noise would be enlarged with it. Encoding is a curve, so the mean of
+//! encoded noise is not the encoded mean. Here the curve is replaced by its tangent at a pivot p that half h does not
+//! know: X_h is linear in m_h, and its mean is the encoded mean as far as the pivot is right. m_i is a control variate
+//! (Owen, "Monte Carlo theory, methods and examples", section 8.9) that moves no expectation, whatever r is, as far as R
+//! is the mean of t. For the true maps q = t and r = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of
+//! paths.
 
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};

@@ -12,7 +12,7 @@
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::{Camera, RendererId, SceneLights};
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, exr_io};
-use mateval_light::light_fit::{FitTarget, FittedRadiances, fit_two_streams};
+use mateval_light::light_fit::{FitTarget, TwoStreamFit, fit_two_streams};
 use mateval_light::light_stage;
 use mateval_light::photo_pixels::{PhotoRules, exposure_factor};
 use mateval_metrics::alignment::scaled;
@@ -40,7 +40,7 @@ pub(crate) struct Photos {
 
 impl Photos {
     pub(crate) fn of_renderer(task: &SceneTask<'_>, renderer: &RendererId) -> Result<Self, EvalError> {
-        let pictures = task.views.iter().map(|view| photo_of_renderer(task.folder, renderer, view));
+        let pictures = task.views.iter().map(|view| photo_of_renderer(&task.open.folder, renderer, view));
         Ok(Self {
             pictures: pictures.collect::<Result<_, _>>()?,
             free: vec![None; task.views.len()],
@@ -57,9 +57,9 @@ impl Photos {
         let mut photos = Self { pictures: Vec::new(), free: Vec::new(), clipped_from: rules.clipped_from.min(1.0) };
         let mut all_counted = Vec::new();
         for (view, truth) in task.views.iter().zip(truths) {
-            let shown = task.folder.view(&view.id);
+            let shown = task.open.folder.view(&view.id);
             let is_input = view.id.as_str() == INPUT;
-            let file = if is_input { shown.join("rgb.exr") } else { task.folder.novel_photo(&view.id) };
+            let file = if is_input { shown.join("rgb.exr") } else { task.open.folder.novel_photo(&view.id) };
             let photo = sized(view, exr_io::read_linear(&file)?)?;
             let depth = sized(view, exr_io::read_scalar(&shown.join("depth.exr"))?)?;
             let counted = rules.counted(&photo, task.scene.exposure, &depth, &truth.valid);
@@ -87,7 +87,6 @@ pub(crate) fn compare_under_fitted_lights(
     let paths = lit.paths(task, protocol);
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
     let pixels = task.pixels().next().unwrap_or(0);
-    let samples = protocol.light.samples.each_half(pixels);
     // A batch holds a render and four quarters of every prediction under two fits, or two bases of the input view.
     let pictures = (5 * 2 * task.views.len()).max(4 * lit.names.len()) as u64;
     let bytes = pictures * pixels * size_of::<LinearRgb>() as u64;
@@ -96,10 +95,11 @@ pub(crate) fn compare_under_fitted_lights(
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
         let repaint = paths.repaint(&predictions, None)?;
         let fits = lit.fit(&paths, &repaint, task, truths, photos)?;
-        let mixes: Vec<Vec<LightMix>> = fits.iter().map(|fit| fit.streams.to_vec()).collect();
+        let weights = |fit: &TwoStreamFit| fit.streams.iter().map(|stream| stream.weights.clone()).collect();
+        let mixes: Vec<Vec<LightMix>> = fits.iter().map(weights).collect();
         let picture =
             |renders: &[ViewsRender], at: usize, fit: usize, view: usize| exposed(picture_of(&renders[at], view, fit));
-        let (quarters, not_finite) = paths.quarters(&repaint, &mixes, &cameras, batch.len(), samples, picture)?;
+        let (quarters, not_finite) = paths.quarters(&repaint, &mixes, &cameras, batch.len(), picture)?;
         for (at, (&index, fit)) in batch.iter().zip(fits).enumerate() {
             let [first, second] = &quarters[at][..] else { unreachable!("two fits make two pictures") };
             let ratios = base_colors.ratios(index);
@@ -112,7 +112,8 @@ pub(crate) fn compare_under_fitted_lights(
                 plain_differences(&views, &guides, free)
             };
             let of_fits = Some([under(first), under(second)]);
-            let (track, not_finite, fit) = (Track::Fitted, not_finite[at], Some(fit.radiances));
+            let (track, not_finite) = (Track::Fitted, not_finite[at]);
+            let fit = Some(fit.radiances(&lit.names, lit.is_stage));
             let views = plain_differences(&both, &guides, free);
             each(index, LitViews { track, lighting: None, references: &references, views, of_fits, fit, not_finite })?;
         }
@@ -158,22 +159,16 @@ struct FittedLights {
     is_stage: bool,
 }
 
-/// The weights of the lights that one prediction was fitted with.
-struct Fit {
-    streams: [LightMix; 2],
-    radiances: FittedRadiances,
-}
-
 impl FittedLights {
     fn new(task: &SceneTask<'_>, protocol: &Protocol) -> Result<Self, EvalError> {
         if task.scene.lights == SceneLights::Own {
-            let names = task.world.scene().lights.iter().map(|light| light.name.clone()).collect();
-            return Ok(Self { world: task.world.clone(), names, is_stage: false });
+            let names = task.open.world.scene().lights.iter().map(|light| light.name.clone()).collect();
+            return Ok(Self { world: task.open.world.clone(), names, is_stage: false });
         }
-        let stage = light_stage::scene_lights(&protocol.light.stage, task.scene, task.world);
+        let stage = light_stage::scene_lights(&protocol.light.stage, task.scene, &task.open.world);
         let quads: Vec<StageLight> = stage.iter().map(|named| named.light.clone()).collect();
         let names = stage.into_iter().map(|named| named.name).collect();
-        Ok(Self { world: task.world.on_stage(&quads)?, names, is_stage: true })
+        Ok(Self { world: task.open.world.on_stage(&quads)?, names, is_stage: true })
     }
 
     fn paths<'a>(&'a self, task: &'a SceneTask<'a>, protocol: &'a Protocol) -> SharedPaths<'a> {
@@ -181,7 +176,7 @@ impl FittedLights {
         SharedPaths {
             scene: &task.scene.id,
             world: &self.world,
-            atlases: task.atlases,
+            atlases: &task.open.atlases,
             rules: &protocol.light,
             pass: task.set.pass(pass),
             progress: task.progress,
@@ -195,7 +190,7 @@ impl FittedLights {
         task: &SceneTask<'_>,
         truths: &[ViewTruth],
         photos: &Photos,
-    ) -> Result<Vec<Fit>, EvalError> {
+    ) -> Result<Vec<TwoStreamFit>, EvalError> {
         let input = task.input_view()?;
         let place = task.views.iter().position(|view| view.id == input.id);
         let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: task.scene.id.clone() })?;
@@ -203,16 +198,12 @@ impl FittedLights {
         let bases = |stream: &str| -> Result<Vec<LightBasis>, EvalError> {
             let cameras = std::slice::from_ref(&input.camera);
             let renders = paths.trace(repaint, Lighting::Apart, cameras, samples, stream)?;
-            Ok(renders.into_iter().map(|mut render| render.views.remove(0).halves.remove(0)).collect())
+            Ok(renders.into_iter().map(|mut render| render.views.remove(0).by_seed.remove(0)).collect())
         };
         let (first, second) = (bases("fit_a")?, bases("fit_b")?);
         let exposure = task.scene.exposure / photos.clipped_from;
         let target = FitTarget { photo: &photos.pictures[place], mask: Some(&truths[place].valid), exposure };
-        let fits = first.iter().zip(&second).map(|(first, second)| {
-            let fit = fit_two_streams(&paths.rules.fit, [first, second], &target)?;
-            let radiances = fit.radiances(&self.names, self.is_stage);
-            Ok(Fit { streams: fit.streams.map(|stream| stream.weights), radiances })
-        });
-        fits.collect()
+        let pairs = first.iter().zip(&second);
+        Ok(pairs.map(|(a, b)| fit_two_streams(&paths.rules.fit, [a, b], &target)).collect::<Result<_, _>>()?)
     }
 }

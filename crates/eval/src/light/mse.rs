@@ -3,14 +3,18 @@
 //! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the
 //! encoded difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is
 //! the squared true difference, whatever the noise of the paths. Each half consists of two quarters. Half of their
-//! difference, encoded as X (or Y) is, has the half's noise and nothing else: u (or v). With X = d + x and Y = d + y,
-//! X*Y - d² = d (x + y) + x y, and the expectation of (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y, whatever
-//! the distribution of the noise, if quarters are independent: of the squares d x, d y and x y that make the variance,
-//! the first two terms count x y twice, the last takes it away once. Where few large contributions make it small or
-//! negative, half of the first two terms counts, which in expectation is at least half of the variance.
+//! difference, encoded as X (or Y) is, has the half's noise and nothing else: u (or v). Pixels whose noise is correlated
+//! form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)).
 //!
-//! Pixels whose noise is correlated form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)): all
-//! sums are taken within blocks, and variances are added over them. Three effects are left out, being small where they
+//! ```text
+//! S = sum over blocks of (Σ Y u)² + (Σ X v)²,   P = sum over blocks of (Σ u v)²
+//! variance of Σ X Y = max(S - P, S / 2)
+//! ```
+//!
+//! With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and the expectation of S - P is the variance, whatever the
+//! distribution of the noise, if quarters are independent: of the squares d x, d y and x y that make the variance, S
+//! counts x y twice, P takes it away once. Where few large contributions make the difference small or negative, S / 2
+//! counts, which in expectation is at least half of the variance. Three effects are left out, being small where they
 //! were measured (`benches/spread.rs`): the halves share a little through the pivot of the other half, the filter that
 //! makes it reaches beyond a block, and R has noise of its own, which both halves have in common (`variance` in
 //! `scorer.json` states it).
@@ -98,7 +102,7 @@ impl LightMse {
         self.mse < self.bounded()
     }
 
-    /// The PSNR of [`Self::bounded`]: it never rises with `mse`, nor jumps. It is exact where neither error nor noise
+    /// The PSNR of [`Self::bounded`]: continuous in `mse`, and never higher where `mse` is. It is exact where neither error nor noise
     /// is left.
     pub fn psnr(&self) -> Result<Psnr, MetricError> {
         Psnr::from_mse(self.bounded())

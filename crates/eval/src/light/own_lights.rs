@@ -2,8 +2,9 @@
 
 use mateval_dataset::Camera;
 use mateval_dataset::lighting::{LightingName, light_of, lightings, weighted};
-use mateval_image::{LUMINANCE, LinearRgb, Picture, png_io};
+use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_light::light_fit::FittedRadiances;
+use mateval_tracer::emitter::group_shares::shares_for;
 use mateval_tracer::noise_filter::Surfaces;
 use mateval_tracer::{LightMix, ViewsRender, World};
 use rayon::prelude::*;
@@ -56,13 +57,11 @@ pub(super) fn compare_under_own_lights(
     let (lightings, group_light) = own_lightings(task, reference, protocol)?;
     let mixes: Vec<LightMix> = lightings.iter().map(|lighting| lighting.mix.clone()).collect();
     let input = task.input_view()?;
-    let world: World = task.world.with_group_shares(&input.camera, &group_shares(&mixes, &group_light));
-    let (scene, atlases, progress) = (&task.scene.id, task.atlases, task.progress);
+    let world: World = task.open.world.with_group_shares(&input.camera, &shares_for(&mixes, &group_light));
+    let (scene, atlases, progress) = (&task.scene.id, &task.open.atlases, task.progress);
     let paths = SharedPaths { scene, world: &world, atlases, rules, pass: task.set.pass("own"), progress };
-    let truth = true_maps(task.folder, task.scene)?;
+    let truth = true_maps(&task.open.folder, task.scene)?;
     let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
-    // All views of a set have one size.
-    let samples = rules.samples.each_half(task.pixels().next().unwrap_or(0));
     // A batch holds a render and four quarters of every prediction.
     let bytes = 5 * (lightings.len() as u64) * task.pixels().sum::<u64>() * size_of::<LinearRgb>() as u64;
     let mut compare = |index, ratios: &[_], lighting: &OwnLighting, quarters: ViewQuarters, not_finite| {
@@ -98,13 +97,12 @@ pub(super) fn compare_under_own_lights(
             let (reference, ratio) = (&lightings[lighting].references[view].linear, &ratios[prediction][view]);
             corrected_quarter(own, truth, task.scene.exposure, reference, ratio)
         };
-        let (mut quarters, mut not_finite) =
-            paths.quarters(&repaint, &mixes, &cameras, batch.len(), samples, corrected)?;
+        let (mut quarters, mut not_finite) = paths.quarters(&repaint, &mixes, &cameras, batch.len(), corrected)?;
         for (at, &index) in batch.iter().enumerate() {
-            for (picture, lighting) in lightings.iter().enumerate() {
+            for (place, lighting) in lightings.iter().enumerate() {
                 // One set of paths serves all lightings: its count goes to the first.
                 let not_finite = std::mem::take(&mut not_finite[at]);
-                compare(index, &ratios[at], lighting, std::mem::take(&mut quarters[at][picture]), not_finite)?;
+                compare(index, &ratios[at], lighting, std::mem::take(&mut quarters[at][place]), not_finite)?;
             }
         }
     }
@@ -118,29 +116,24 @@ fn own_lightings(
     protocol: &Protocol,
 ) -> Result<(Vec<OwnLighting>, Vec<[f64; 3]>), EvalError> {
     let input = task.input_view()?;
-    let valid = png_io::read_mask(&task.folder.view(&input.id).join("valid.png"))?;
+    let valid = png_io::read_mask(&task.open.folder.view(&input.id).join("valid.png"))?;
     let group_light: Vec<[f64; 3]> = reference.groups(input)?.iter().map(|group| light_of(group, &valid)).collect();
-    let groups = task.world.emitters().groups();
+    let groups = task.open.world.emitters().groups();
     if group_light.len() != groups {
-        return Err(EvalError::Reference {
-            dataset: task.dataset.to_owned(),
-            scene: task.scene.id.clone(),
-            path: task.folder.scorer(),
-            what: format!("it has {} light groups, the scene has {groups}", group_light.len()),
-        });
+        let what = format!("it has {} light groups, the scene has {groups}", group_light.len());
+        return Err(EvalError::reference(task.dataset, task.scene, what));
     }
-    let mut wanted = vec![(Track::True, None, vec![[1.0; 3]; groups])];
+    let blank = |track, name, mix| OwnLighting { track, name, mix, references: Vec::new() };
+    let mut all = vec![blank(Track::True, None, vec![[1.0; 3]; groups])];
     if protocol.light.tracks.contains(&Track::Relit) {
         let relit = lightings(&protocol.light.relit, &group_light);
-        wanted.extend(relit.into_iter().map(|relit| (Track::Relit, Some(relit.name), relit.weights)));
+        all.extend(relit.into_iter().map(|relit| blank(Track::Relit, Some(relit.name), relit.weights)));
     }
-    let blank = |(track, name, mix)| OwnLighting { track, name, mix, references: Vec::new() };
-    let mut all: Vec<OwnLighting> = wanted.into_iter().map(blank).collect();
     for view in &task.views {
         let groups = reference.groups(view)?;
         let k = view.camera.intrinsics;
+        let size = [k.width as usize, k.height as usize];
         for lighting in &mut all {
-            let size = [k.width as usize, k.height as usize];
             let picture = weighted(&groups, &lighting.mix, task.scene.exposure, size);
             lighting.references.push(ColorPicture::new(picture));
         }
@@ -167,46 +160,5 @@ impl ViewGuides<'_> {
     pub(crate) fn differences(&self, quarters: ViewQuarters) -> Vec<LightDifference> {
         let views = quarters.par_iter().enumerate();
         views.map(|(view, quarters)| difference([0, 1, 2, 3].map(|at| &quarters[at]), &self.of(view))).collect()
-    }
-}
-
-/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its
-/// squared share of their luminance. With light samples divided in these proportions, the sum of the pictures'
-/// variances is least if the variance of a group's light follows the square of the light (Cochran, "Sampling
-/// techniques", section 5.5).
-fn group_shares(mixes: &[LightMix], sums: &[[f64; 3]]) -> Vec<f64> {
-    let mut squares = vec![0.0; sums.len()];
-    for mix in mixes {
-        let of_groups: Vec<f64> = sums.iter().zip(mix).map(|(sum, weight)| luminance_of(sum, weight)).collect();
-        let total: f64 = of_groups.iter().sum();
-        if total > 0.0 {
-            squares.iter_mut().zip(of_groups).for_each(|(square, light)| *square += (light / total).powi(2));
-        }
-    }
-    squares.into_iter().map(f64::sqrt).collect()
-}
-
-/// The luminance of a group's light under its weights.
-fn luminance_of(sum: &[f64; 3], weight: &[f64; 3]) -> f64 {
-    (0..3).map(|c| LUMINANCE[c] * sum[c] * weight[c]).sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A faint group that is once alone is sampled more often than its light in the other pictures would deserve.
-    #[test]
-    fn shares_follow_the_pictures() {
-        let sums = [[9.0; 3], [1.0; 3]];
-        let own = vec![[1.0; 3]; 2];
-        let shares = |mixes: &[LightMix]| {
-            let shares = group_shares(mixes, &sums);
-            shares[1] / shares[0]
-        };
-        assert!((shares(std::slice::from_ref(&own)) - 1.0 / 9.0).abs() < 1e-12);
-        let alone = vec![[0.0; 3], [10.0; 3]];
-        assert!((shares(&[own, alone]) - (1.01_f64.sqrt() / 0.9)).abs() < 1e-12);
-        assert_eq!(group_shares(&[vec![[0.0; 3]; 2]], &sums), [0.0; 2]);
     }
 }

@@ -121,17 +121,18 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
             file.seeds = ["a", "b"].map(|stream| format!("{:016x}", paths.seed(stream)));
         }
         for ((view, a), b) in views.iter().zip(a.views).zip(b.views) {
-            let [a, b] = [&a.halves[0], &b.halves[0]];
+            let [a, b] = [&a.by_seed[0], &b.by_seed[0]];
             let valid = png_io::read_mask(&folder.view(&view.id).join("valid.png"))?;
             file.variance.insert(view.id.clone(), variance([&a.sum(), &b.sum()], &valid, scene.exposure));
             let of_view = work.path().join(view.id.as_str());
             std::fs::create_dir_all(&of_view).map_err(FileError::io("create", &of_view))?;
             for (group, (a, b)) in a.pictures().iter().zip(b.pictures()).enumerate() {
-                let path = of_view.join(group_file(group));
+                let name = listed_name(view, group);
+                let path = work.path().join(&name);
                 // Within the range of half floats.
                 let mean = mean_of(a, b).map(|LinearRgb(rgb)| LinearRgb(rgb.map(|value| value.min(65504.0))));
                 exr_io::write_linear(&path, &mean, Precision::Half)?;
-                file.files.insert(listed_name(view, group), sha256_of_file(&path)?);
+                file.files.insert(name, sha256_of_file(&path)?);
             }
         }
     }
@@ -139,13 +140,9 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
     Ok(work.finish()?)
 }
 
-fn group_file(group: usize) -> String {
-    format!("group_{group:02}.exr")
-}
-
 /// The path of a picture in `renders/scorer`.
 fn listed_name(view: &View, group: usize) -> String {
-    format!("{}/{}", view.id, group_file(group))
+    format!("{}/group_{group:02}.exr", view.id)
 }
 
 /// The variance that noise causes in the encoded mean: mean over the valid pixels and their channels; 0 without any.
@@ -180,12 +177,7 @@ impl StoredReference {
         if !folder.exists() {
             return Ok(None);
         }
-        let unusable = |what: String| EvalError::Reference {
-            dataset: dataset.root.clone(),
-            scene: scene.id.clone(),
-            path: folder.clone(),
-            what,
-        };
+        let unusable = |what: String| EvalError::reference(dataset, scene, what);
         let path = folder.join(SCORER_JSON);
         if !path.exists() {
             return Err(unusable(format!("{SCORER_JSON} is missing: the render was cut off")));
@@ -219,14 +211,11 @@ impl StoredReference {
         let read = |group: usize| -> Result<Picture<LinearRgb>, EvalError> {
             let picture = sized(view, exr_io::read_linear(&self.folder.join(listed_name(view, group)))?)?;
             // A hash that fits says nothing about values: the dataset may come from anywhere.
-            match picture.pixels().iter().flat_map(|rgb| rgb.0).all(|v| v.is_finite() && v >= 0.0) {
-                true => Ok(picture),
-                false => Err(EvalError::Unsound {
-                    place: format!("'{}', {}", self.folder.display(), listed_name(view, group)),
-                    expected: "light that is finite and not negative".to_owned(),
-                    found: "other values".to_owned(),
-                }),
+            if picture.pixels().iter().flat_map(|rgb| rgb.0).all(|v| v.is_finite() && v >= 0.0) {
+                return Ok(picture);
             }
+            let place = format!("'{}', {}", self.folder.display(), listed_name(view, group));
+            Err(EvalError::unsound(place, "light that is finite and not negative", "other values"))
         };
         (0..self.file.lights.len()).map(read).collect()
     }
@@ -268,7 +257,7 @@ mod tests {
         let mix: Vec<[f64; 3]> = (0..groups.len()).map(|at| [1.0, 0.5, 2.0].map(|v| v * (1 + at) as f64)).collect();
         let mixes = [vec![mix.clone()]];
         let fresh = paths.trace(&repaint, Lighting::Mixed(&mixes), &[view.camera], 128, "a").unwrap().remove(0);
-        let fresh = mean(&fresh.views[0].halves[0].pictures()[0]);
+        let fresh = mean(&fresh.views[0].by_seed[0].pictures()[0]);
         let size = [groups[0].width(), groups[0].height()];
         let found = mean(&weighted(&groups, &mix, 1.0, size));
         let twin = mean(&weighted(&groups, &vec![[1.0; 3]; groups.len()], 1.0, size));

@@ -5,7 +5,6 @@ use mateval_dataset::layout::INPUT;
 use mateval_dataset::{Camera, SceneId};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::photo_pixels::PhotoRules;
-use mateval_metrics::pixel::pixel_count;
 use mateval_metrics::{MetricError, Psnr};
 use mateval_tracer::shared_centre::noise_blocks;
 use rayon::prelude::*;
@@ -13,7 +12,7 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::light::difference::LightDifference;
 use crate::light::fitted_lights::{Photos, compare_under_fitted_lights};
-use crate::light::mse::{LightMse, mean_psnr_error};
+use crate::light::mse::LightMse;
 use crate::light::own_lights::{LitSink, LitViews, compare_under_own_lights};
 use crate::materials::score::measure_whole_view;
 use crate::metric::{EncodedPair, Metric, PictureKind};
@@ -32,7 +31,7 @@ pub(crate) fn score_light(
     sheets: &mut [Vec<ScoreSheet>],
 ) -> Result<(), EvalError> {
     let protocol = &task.protocols[at];
-    let meter = LightMeter::new(task, truths, protocol);
+    let meter = LightMeter::new(task, truths, truths.iter().map(regions).collect(), protocol);
     let mut each = |submission: usize, lit: LitViews| meter.measure(&lit, &mut sheets[submission][at]);
     compare_under_lights(task, truths, base_colors, protocol, &mut each)
 }
@@ -69,29 +68,16 @@ pub(crate) fn score_photos(
     let truths = task.truths()?;
     let (photos, counted) = Photos::of_capture(&task, &truths, rules)?;
     let narrowed = |(truth, counted): (&ViewTruth, &Mask)| {
-        let both = |mask: &Mask| Mask::from_fn(mask.width(), mask.height(), |x, y| mask.get(x, y) && counted.get(x, y));
-        ViewTruth { valid: counted.clone(), unobserved: truth.unobserved.as_ref().map(both), ..truth.clone() }
+        regions(truth).into_iter().map(|region| region.narrowed(counted)).collect::<Vec<_>>()
     };
-    let narrowed: Vec<ViewTruth> = truths.iter().zip(&counted).map(narrowed).collect();
+    let narrowed = truths.iter().zip(&counted).map(narrowed).collect();
     // True base colours are not known. Black on both sides makes every ratio 1.
     let black = |truth: &ViewTruth| Picture::filled(truth.valid.width(), truth.valid.height(), LinearRgb([0.0; 3]));
     let truth: Vec<_> = truths.iter().map(black).collect();
     let base_colors = BaseColors { predicted: vec![truth.clone(); task.predictions.len()], truth };
-    let meter = LightMeter::new(&task, &narrowed, &task.protocols[at]);
+    let meter = LightMeter::new(&task, &truths, narrowed, &task.protocols[at]);
     let mut each = |submission: usize, lit: LitViews| meter.measure(&lit, &mut sheets[submission][at]);
-    compare_under_fitted_lights(&task, &photos, &truths, &base_colors, &task.protocols[at], &mut each)?;
-    let of_views: Vec<Vec<MaskedRegion>> = truths.iter().map(regions).collect();
-    for values in sheets.iter_mut().flat_map(|sheets| &mut sheets[at].score.pictures) {
-        let place = task.views.iter().position(|view| view.id == values.view && values.picture.kind.is_light());
-        let region = place.and_then(|view| {
-            of_views[view]
-                .iter()
-                .find(|known| (known.region, known.surfaces) == (values.region, values.picture.surfaces))
-        });
-        let all = region.map_or(0, |region| pixel_count(&region.mask));
-        values.left_out = (all > 0).then(|| 1.0 - values.pixels as f64 / all as f64);
-    }
-    Ok(())
+    compare_under_fitted_lights(&task, &photos, &truths, &base_colors, &task.protocols[at], &mut each)
 }
 
 struct LightMeter<'a> {
@@ -103,10 +89,15 @@ struct LightMeter<'a> {
 }
 
 impl<'a> LightMeter<'a> {
-    fn new(task: &'a SceneTask<'a>, truths: &'a [ViewTruth], protocol: &'a Protocol) -> Self {
+    fn new(
+        task: &'a SceneTask<'a>,
+        truths: &'a [ViewTruth],
+        regions: Vec<Vec<MaskedRegion>>,
+        protocol: &'a Protocol,
+    ) -> Self {
         let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
         let blocks = noise_blocks(&cameras, protocol.light.samples.block_pixels);
-        Self { task, protocol, truths, regions: truths.iter().map(regions).collect(), blocks }
+        Self { task, protocol, truths, regions, blocks }
     }
 
     fn measure(&self, lit: &LitViews<'_>, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
@@ -123,7 +114,7 @@ impl<'a> LightMeter<'a> {
         for (&(view, _), measured) in jobs.iter().zip(measured) {
             let view = self.task.views[view];
             let (values, mse) = self.task.locate_error(view, measured)?;
-            sheet.light_errors.entry(values.key(Metric::Psnr)).or_default().extend(mse);
+            sheet.light_mses.entry(values.key(Metric::Psnr)).or_default().extend(mse);
             sheet.score.pictures.push(values);
         }
         sheet.score.fit = lit.fit.clone().or(sheet.score.fit.take());
@@ -170,25 +161,12 @@ impl<'a> LightMeter<'a> {
     }
 
     fn add_instance_errors(&self, kind: PictureKind, found: &[LightDifference], sheet: &mut ScoreSheet) {
-        for ((view, truth), found) in self.task.views.iter().zip(self.truths).zip(found) {
+        for (at, (view, found)) in self.task.views.iter().zip(found).enumerate() {
             let error = |k: usize| {
                 let [x, y] = found.halves.each_ref().map(|half| half.pixels()[k].0.map(f64::from));
                 (0..3).map(|c| x[c] * y[c]).sum::<f64>() / 3.0
             };
-            sheet.errors.add(kind, &view.id, truth, error);
-        }
-    }
-}
-
-impl ScoreSheet {
-    /// States the noise of the scene's mean PSNRs, once all pictures have been measured. Where one is a lower bound, a
-    /// standard error would say nothing.
-    pub(crate) fn state_noise(&mut self) {
-        for (key, mses) in std::mem::take(&mut self.light_errors) {
-            if mses.iter().any(LightMse::is_lower_bound) {
-                continue;
-            }
-            self.score.noise.extend(mean_psnr_error(&mses).map(|error| (key, error)));
+            sheet.errors.add(kind, &view.id, &self.truths[at].instances, &self.regions[at], error);
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Renders of predictions that share paths.
 //!
 //! Predictions that agree in roughness and metallic differ in base colour alone, on which no decision along a path
-//! depends: they share their paths. The truth can travel along, also where its roughness and metallic are others:
-//! directions then come from both densities in equal parts, and each of both is weighted by its own. A prediction's
-//! pictures are the same, bit for bit, whichever others are rendered with it.
+//! depends: they travel along the same paths, each with its own colours. So does the truth, also where its roughness and
+//! metallic are others: directions then come from both densities in equal parts, and each of both is weighted by its
+//! own. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,15 @@ use mateval_dataset::{Camera, Progress, Report, SceneId, TriangleMesh};
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::{LinearRgb, Picture};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
-use mateval_tracer::{Coat, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted};
+use mateval_tracer::{
+    Coat, LightMix, Lighting, RenderSettings, Repaint, Scattering, ViewsRender, World, render_repainted,
+};
 use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::protocol::LightRules;
 
+/// By view, then by quarter.
 pub(crate) type ViewQuarters = Vec<Vec<Picture<LinearRgb>>>;
 
 /// The four independent renders of a prediction: both quarters of the first half, then of the second.
@@ -32,7 +35,7 @@ pub(crate) struct SharedPaths<'a> {
     /// The meshes of `instances.glb`, one for each surface of the world.
     pub(crate) atlases: &'a [TriangleMesh],
     pub(crate) rules: &'a LightRules,
-    /// The name of the pass, part of the seeds.
+    /// The name of this job, part of the seeds: a set of views under some lights. Each of its streams has one seed.
     pub(crate) pass: String,
     pub(crate) progress: Progress<'a>,
 }
@@ -49,13 +52,14 @@ impl SharedPaths<'_> {
     ) -> Result<Vec<ViewsRender>, EvalError> {
         let what = format!("scene {}: {} light, {samples} samples, {stream}", self.scene, self.pass);
         let seeds = [self.seed(stream)];
-        let settings = self.rules.settings(samples);
+        let LightRules { max_bounces, roulette_start, roulette_survival, .. } = *self.rules;
+        let settings = RenderSettings { samples, max_bounces, roulette_start, roulette_survival, ..Default::default() };
         let shown = |done: usize, all: usize| (self.progress)(Report::step(&what, done, all));
         Ok(render_repainted(self.world, repaint, cameras, lighting, &settings, &seeds, &shown)?)
     }
 
     /// The quarters of the first `predictions` that travel, by prediction, light mix and view, and the number of
-    /// contributions of each that were not finite. Each half has `samples` per pixel, so a quarter has half of them.
+    /// contributions of each that were not finite. A quarter has half the samples of a half.
     /// `picture` makes the picture of (prediction, mix, view) from one stream's renders of everything that travels.
     pub(crate) fn quarters(
         &self,
@@ -63,13 +67,13 @@ impl SharedPaths<'_> {
         mixes: &[Vec<LightMix>],
         cameras: &[Camera],
         predictions: usize,
-        samples: u32,
         picture: impl Fn(&[ViewsRender], usize, usize, usize) -> Picture<LinearRgb> + Sync,
     ) -> Result<(Vec<Vec<ViewQuarters>>, Vec<u64>), EvalError> {
         let mut quarters = vec![vec![vec![Vec::new(); cameras.len()]; mixes[0].len()]; predictions];
         let mut not_finite = vec![0; predictions];
+        let samples = (self.rules.samples.each_half / 2).max(1);
         for stream in QUARTERS {
-            let renders = self.trace(repaint, Lighting::Mixed(mixes), cameras, (samples / 2).max(1), stream)?;
+            let renders = self.trace(repaint, Lighting::Mixed(mixes), cameras, samples, stream)?;
             for (prediction, mixes) in quarters.iter_mut().enumerate() {
                 not_finite[prediction] += renders[prediction].stats.not_finite;
                 for (mix, views) in mixes.iter_mut().enumerate() {
@@ -96,24 +100,22 @@ impl SharedPaths<'_> {
     ) -> Result<Repaint, EvalError> {
         let all: Vec<&PredictedScene> = predictions.iter().copied().chain(truth).collect();
         let first = all.first().expect("there is something to render");
-        let coat = |surface: usize| {
-            let PredictedMaterial { roughness, metallic, .. } = first.materials[surface].clone()?;
-            let base_colors = all.iter().map(|scene| Some(scene.materials[surface].as_ref()?.base_color.clone()));
-            Some(Coat {
-                base_colors: base_colors.collect::<Option<_>>()?,
-                scattering: Scattering { roughness, metallic },
-            })
+        let scattering = |scene: &PredictedScene, surface: usize| {
+            let PredictedMaterial { roughness, metallic, .. } = scene.materials[surface].clone()?;
+            Some(Scattering { roughness, metallic })
         };
-        let coats: Vec<Option<Coat>> = (0..self.atlases.len()).map(coat).collect();
+        let coat = |surface: usize| {
+            let base_colors = all.iter().map(|scene| Some(scene.materials[surface].as_ref()?.base_color.clone()));
+            Some(Coat { base_colors: base_colors.collect::<Option<_>>()?, scattering: scattering(first, surface)? })
+        };
+        let surfaces = 0..self.atlases.len();
+        let coats = surfaces.clone().map(coat).collect();
         let repaint = Repaint::new(self.world, self.atlases, coats, self.rules.flavour)?;
         match truth.filter(|truth| truth.scattering_key != first.scattering_key) {
             None => Ok(repaint),
             Some(truth) => {
-                let own = |material: &Option<PredictedMaterial>| {
-                    let PredictedMaterial { roughness, metallic, .. } = material.clone()?;
-                    Some(Scattering { roughness, metallic })
-                };
-                Ok(repaint.with_second(predictions.len(), truth.materials.iter().map(own).collect())?)
+                let second = surfaces.map(|surface| scattering(truth, surface)).collect();
+                Ok(repaint.with_second(predictions.len(), second)?)
             }
         }
     }
@@ -134,5 +136,5 @@ pub(crate) fn batches(all: &[PredictedScene], predictions: &[usize], along: usiz
 
 /// A picture of one view. Every stream has one seed, so the tracer's list of halves holds one.
 pub(crate) fn picture_of(render: &ViewsRender, view: usize, picture: usize) -> &Picture<LinearRgb> {
-    &render.views[view].halves[0].pictures()[picture]
+    &render.views[view].by_seed[0].pictures()[picture]
 }

@@ -33,7 +33,7 @@ impl Measured {
         for (at, region) in regions.iter().enumerate() {
             if let Some(found) = color_fault(&region.color, region.standard_error.as_ref()) {
                 let place = format!("'{}': /regions/{at}", folder.measured().display());
-                return Err(EvalError::Unsound { place, expected: "a measured colour".to_owned(), found });
+                return Err(EvalError::unsound(place, "a measured colour", found));
             }
         }
         let mut pictures = BTreeMap::new();
@@ -80,12 +80,12 @@ impl SceneTask<'_> {
         wanted: &impl Fn(usize) -> bool,
         sheets: &mut [Vec<ScoreSheet>],
     ) -> Result<(), EvalError> {
-        let measured = Measured::read(self.folder, &self.views)?;
+        let measured = Measured::read(&self.open.folder, &self.views)?;
         let predictions: Vec<&PredictedScene> = self.predictions.iter().collect();
         for view in &self.views {
             let Some(regions) = measured.pictures.get(&view.id) else { continue };
             let small = maw_mask(regions);
-            let pictures = material_pictures(self.world, self.atlases, &view.camera, &predictions, Places::All);
+            let pictures = material_pictures(self.open, &view.camera, &predictions, Places::All);
             for (sheets, pictures) in sheets.iter_mut().zip(pictures) {
                 let of_view = || measured.regions.iter().filter(|region| region.view == view.id);
                 let whole = sums(regions, &pictures.base_color, |LinearRgb(rgb)| rgb.map(f64::from));

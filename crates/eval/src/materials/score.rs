@@ -16,7 +16,7 @@ use crate::metric::{ColorPicture, EncodedPair, HALF_A_BYTE, Measure, Metric, Pic
 use crate::protocol::{AlbedoSpace, Protocol};
 use crate::result::PictureValues;
 use crate::result::key::Surfaces;
-use crate::scene::{BaseColors, InstanceErrors, MaskedRegion, SceneTask, ScoreSheet, regions};
+use crate::scene::{BaseColors, MaskedRegion, SceneTask, ScoreSheet, regions};
 use crate::truth::{ViewTruth, true_maps};
 
 struct Predicted {
@@ -75,7 +75,14 @@ impl SceneTask<'_> {
             for ((s, p), values) in jobs.into_iter().zip(measured) {
                 let sheet = &mut sheets[s][p];
                 sheet.score.pictures.extend(values?);
-                self.material_errors(&self.protocols[p], view, &predicted[s], &truth, &mut sheet.errors);
+                for (kind, albedo) in &predicted[s].albedos {
+                    let pair = [albedo, &truth.albedo];
+                    let error = |k: usize| match self.protocols[p].albedo_space {
+                        AlbedoSpace::Linear => mean_square(pair.map(|albedo| albedo.linear.pixels()[k].0)),
+                        AlbedoSpace::Srgb => mean_square(pair.map(|albedo| albedo.encoded.pixels()[k].0)),
+                    };
+                    sheet.errors.add(*kind, &view.id, &truth.view.instances, &truth.regions, error);
+                }
             }
             Ok(())
         })
@@ -90,11 +97,11 @@ impl SceneTask<'_> {
     fn each_view(&self, each: &mut EachView<'_>) -> Result<BaseColors, EvalError> {
         let blank = vec![Vec::new(); self.predictions.len()];
         let mut base_colors = BaseColors { truth: Vec::new(), predicted: blank };
-        let true_maps = true_maps(self.folder, self.scene)?;
+        let true_maps = true_maps(&self.open.folder, self.scene)?;
         let all: Vec<&PredictedScene> = self.predictions.iter().chain([&true_maps]).collect();
         for (at, view) in self.views.iter().enumerate() {
             (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
-            let mut pictures = material_pictures(self.world, self.atlases, &view.camera, &all, Places::AsTruth);
+            let mut pictures = material_pictures(self.open, &view.camera, &all, Places::AsTruth);
             let truth = pictures.pop().expect("the truth comes last").base_color;
             each(view, at, &pictures, &truth)?;
             base_colors.truth.push(truth);
@@ -141,36 +148,9 @@ impl SceneTask<'_> {
         Ok(all)
     }
 
-    /// Adds the squared errors of raw and aligned albedo to the sums by instance.
-    fn material_errors(
-        &self,
-        protocol: &Protocol,
-        view: &View,
-        predicted: &Predicted,
-        truth: &Truth<'_>,
-        errors: &mut InstanceErrors,
-    ) {
-        for (kind, albedo) in &predicted.albedos {
-            let (of, reference) = (albedo, &truth.albedo);
-            let error = |k: usize| match protocol.albedo_space {
-                AlbedoSpace::Linear => mean_square(of.linear.pixels()[k].0, reference.linear.pixels()[k].0),
-                AlbedoSpace::Srgb => mean_square(of.encoded.pixels()[k].0, reference.encoded.pixels()[k].0),
-            };
-            errors.add(*kind, &view.id, truth.view, error);
-        }
-    }
-
     /// Errors of texels; they are the same under every protocol.
     pub(crate) fn score_texels(&self, sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
-        let found = texture_space(
-            self.folder,
-            self.scene,
-            self.world,
-            self.atlases,
-            self.predictions,
-            self.pictures,
-            self.progress,
-        )?;
+        let found = texture_space(self.open, self.scene, self.predictions, self.pictures, self.progress)?;
         for (sheets, errors) in sheets.iter_mut().zip(found) {
             for sheet in sheets {
                 sheet.score.texels = errors.clone();
@@ -180,7 +160,7 @@ impl SceneTask<'_> {
     }
 }
 
-fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
+fn mean_square([a, b]: [[f32; 3]; 2]) -> f64 {
     (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
 }
 
@@ -277,45 +257,24 @@ mod tests {
 
     use super::*;
 
-    fn pictures() -> (Picture<LinearRgb>, Picture<LinearRgb>, Mask) {
-        let reference = Picture::from_fn(40, 30, |x, y| LinearRgb([x as f32 / 40.0, y as f32 / 30.0, 0.3]));
-        let prediction = reference.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * 0.9)));
-        (prediction, reference, Picture::from_fn(40, 30, |x, _| x >= 20))
-    }
-
     fn blank(kind: PictureKind) -> PictureValues {
         let (scene, view) = (SceneId::new("s").unwrap(), ViewId::new("input").unwrap());
         PictureValues::new(scene, view, PictureName::whole(kind), Region::Valid, 600)
     }
 
-    fn albedo(
-        protocol: &str,
-        prediction: &Picture<LinearRgb>,
-        reference: &Picture<LinearRgb>,
-        mask: &Mask,
-    ) -> PictureValues {
-        let [prediction, reference] = [prediction, reference].map(|picture| ColorPicture::new(picture.clone()));
-        let mut values = blank(PictureKind::Albedo);
-        measure_albedo(&Protocol::named(protocol).unwrap(), None, &prediction, &reference, mask, true, &mut values)
-            .unwrap();
-        values
-    }
-
-    #[test]
-    fn the_protocols_differ_in_masks_and_encoding() {
-        let (prediction, reference, mask) = pictures();
-        let [ours, paper] = ["mateval-3", "paper"].map(|name| albedo(name, &prediction, &reference, &mask).values);
-        // Half of the frame is black in both pictures: the paper's SSIM is nearer to one.
-        assert!(paper[&Metric::Ssim] > ours[&Metric::Ssim] && paper[&Metric::Mse] != ours[&Metric::Mse]);
-        assert!(!ours.contains_key(&Metric::LpipsAlex) && ours[&Metric::DeltaE] > 0.0);
-    }
-
     #[test]
     fn truth_is_exact_and_an_empty_mask_has_no_value() {
-        let (_, reference, mask) = pictures();
-        let found = albedo("mateval-3", &reference, &reference, &mask);
+        let protocol = Protocol::named("mateval-3").unwrap();
+        let truth =
+            ColorPicture::new(Picture::from_fn(40, 30, |x, y| LinearRgb([x as f32 / 40.0, y as f32 / 30.0, 0.3])));
+        let measured = |mask: &Mask| {
+            let mut values = blank(PictureKind::Albedo);
+            measure_albedo(&protocol, None, &truth, &truth, mask, true, &mut values).unwrap();
+            values
+        };
+        let found = measured(&Picture::from_fn(40, 30, |x, _| x >= 20));
         assert!(found.exact && found.values[&Metric::Psnr] == 100.0 && found.values[&Metric::DeltaE] == 0.0);
-        assert!(albedo("mateval-3", &reference, &reference, &Picture::filled(40, 30, false)).values.is_empty());
+        assert!(measured(&Picture::filled(40, 30, false)).values.is_empty());
     }
 
     /// A tenth off everywhere, by hand; and half a byte's step, which is nothing.

@@ -13,15 +13,14 @@ use mateval_dataset::dataset::{Instance, SceneFile};
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::reference::SurfaceIndex;
 use mateval_dataset::submission::MAP_SIZES;
-use mateval_dataset::{Progress, Report, TriangleMesh};
+use mateval_dataset::{Progress, Report};
 use mateval_image::exr_io::Precision;
 use mateval_image::{Texture, exr_io};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
-use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
-use mateval_tracer::World;
-use rayon::prelude::*;
+use mateval_submission::texel_map::TexelMap;
 
 use crate::error::EvalError;
+use crate::open_scene::OpenScene;
 use crate::pictures_dir::PicturesDir;
 use crate::result::{InstanceTexelErrors, TexelErrors};
 use crate::truth::true_material;
@@ -48,44 +47,50 @@ impl TexelSums {
     }
 }
 
-/// Compares every instance that has an atlas, in the scene's order. Returns a list for each submission, in their order.
-///
-/// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces and the scene's instances. Fails
-/// where the truth cannot be read or `scene.json` is unsound.
-pub fn texture_space(
-    folder: &SceneFolder,
+/// Calls `work` for every instance that has an atlas, in the scene's order, with its place, its texels and its true maps.
+/// Fails where the truth cannot be read or `scene.json` is unsound.
+pub(crate) fn each_atlas(
+    open: &OpenScene,
     scene: &SceneFile,
-    world: &World,
-    atlases: &[TriangleMesh],
+    step: &str,
+    progress: Progress<'_>,
+    mut work: impl FnMut(usize, &TexelMap, &PredictedMaterial) -> Result<(), EvalError>,
+) -> Result<(), EvalError> {
+    let input = scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&scene.id))?;
+    for (at, instance) in scene.instances.iter().enumerate() {
+        let Some(size) = checked_size(&open.folder, instance)? else { continue };
+        progress(Report::step(&format!("{step} of {}", scene.id), at, scene.instances.len()));
+        let (map, truth) = rayon::join(
+            || TexelMap::new(&open.world, SurfaceIndex(at), &open.atlases[at], size, &input.camera),
+            || true_material(&open.folder, &instance.id, size),
+        );
+        work(at, &map, &truth?)?;
+    }
+    Ok(())
+}
+
+/// Compares every instance that has an atlas, in the scene's order. Returns a list for each submission, in their order.
+pub fn texture_space(
+    open: &OpenScene,
+    scene: &SceneFile,
     submissions: &[PredictedScene],
     pictures: Option<&PicturesDir>,
     progress: Progress<'_>,
 ) -> Result<Vec<Vec<InstanceTexelErrors>>, EvalError> {
-    let input = scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&scene.id))?;
     let mut compared = vec![Vec::new(); submissions.len()];
-    for (at, instance) in scene.instances.iter().enumerate() {
-        let Some(size) = checked_size(folder, instance)? else { continue };
-        progress(Report::step(&format!("texels of {}", scene.id), at, scene.instances.len()));
-        let (map, truth) = rayon::join(
-            || TexelMap::new(world, SurfaceIndex(at), &atlases[at], size, &input.camera),
-            || true_material(folder, &instance.id, size),
-        );
-        let truth = truth?;
+    each_atlas(open, scene, "texels", progress, |at, map, truth| {
+        let (scene, instance) = (&scene.id, &scene.instances[at].id);
         for (number, (list, submission)) in compared.iter_mut().zip(submissions).enumerate() {
             let Some(prediction) = &submission.materials[at] else { continue };
             if let Some(pictures) = pictures {
-                let path = pictures.texels(number, &scene.id, &instance.id)?;
-                write_texels(&path, &map, &prediction.base_color, &truth.base_color)?;
+                let path = pictures.texels(number, scene, instance)?;
+                write_texels(&path, map, &prediction.base_color, &truth.base_color)?;
             }
-            let [observed, unobserved] = compare(&map, prediction, &truth);
-            list.push(InstanceTexelErrors {
-                scene: scene.id.clone(),
-                instance: instance.id.clone(),
-                observed: observed.errors(),
-                unobserved: unobserved.errors(),
-            });
+            let [observed, unobserved] = compare(map, prediction, truth).map(|sums| sums.errors());
+            list.push(InstanceTexelErrors { scene: scene.clone(), instance: instance.clone(), observed, unobserved });
         }
-    }
+        Ok(())
+    })?;
     Ok(compared)
 }
 
@@ -96,11 +101,9 @@ pub(crate) fn checked_size(folder: &SceneFolder, instance: &Instance) -> Result<
     if MAP_SIZES.contains(&size) {
         return Ok(Some(size));
     }
-    Err(EvalError::Unsound {
-        place: format!("'{}': instance '{}'", folder.scene_file().display(), instance.id),
-        expected: format!("an atlas of {} to {} texels a side", MAP_SIZES.start(), MAP_SIZES.end()),
-        found: size.to_string(),
-    })
+    let place = format!("'{}': instance '{}'", folder.scene_file().display(), instance.id);
+    let expected = format!("an atlas of {} to {} texels a side", MAP_SIZES.start(), MAP_SIZES.end());
+    Err(EvalError::unsound(place, expected, size.to_string()))
 }
 
 /// The squared errors of a prediction, weighted by area: of observed texels, then of unobserved ones.
@@ -111,16 +114,15 @@ fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &PredictedMate
     let row = |y: usize| {
         let mut sums = [TexelSums::default(); 2];
         for texel in map.row(y) {
-            let [p, t] = [prediction, truth].map(|maps| value(map.size(), &maps.base_color, &texel, y));
+            let [p, t] = [prediction, truth].map(|maps| map.value(&maps.base_color, &texel, y));
             let [r, g, b] = [0, 1, 2].map(|c| (f64::from(p[c]) - f64::from(t[c])).powi(2));
             let area_m2 = texel.area_m2;
             sums[usize::from(!texel.observed)].add(&TexelSums { area_m2, base_color: area_m2 * (r + g + b) / 3.0 });
         }
         sums
     };
-    let rows: Vec<[TexelSums; 2]> = (0..map.size()).into_par_iter().map(row).collect();
     let mut sums = [TexelSums::default(); 2];
-    for row in &rows {
+    for row in &map.of_rows(row) {
         sums.iter_mut().zip(row).for_each(|(sum, row)| sum.add(row));
     }
     sums
@@ -134,7 +136,7 @@ fn write_texels(path: &Path, map: &TexelMap, prediction: &Texture, truth: &Textu
     for y in 0..size {
         for texel in map.row(y) {
             let at = y * size + texel.column;
-            let [p, t] = [prediction, truth].map(|texture| value(size, texture, &texel, y));
+            let [p, t] = [prediction, truth].map(|texture| map.value(texture, &texel, y));
             let seen = if texel.observed { 1.0 } else { 0.0 };
             let values = [texel.area_m2 as f32, seen, p[0], p[1], p[2], t[0], t[1], t[2]];
             planes.iter_mut().zip(values).for_each(|(plane, value)| plane[at] = value);
@@ -144,22 +146,6 @@ fn write_texels(path: &Path, map: &TexelMap, prediction: &Texture, truth: &Textu
     Ok(exr_io::write_channels(path, size, size, names.into_iter().zip(planes).collect(), Precision::Float)?)
 }
 
-/// What a texture of any size holds at the place of a texel in row `y` of an atlas of `atlas_size` texels a side.
-pub(crate) fn value(atlas_size: usize, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
-    match (texture.width(), texel.off_centre) {
-        (1, _) => texture.texel(0, 0),
-        (_, Some(uv)) => texture.sample(uv),
-        // The centre of its own texel: exactly, where a uv might be rounded.
-        (size, None) if size == atlas_size => texture.texel(texel.column, y),
-        _ => texture.sample(centre_uv(texel.column, y, atlas_size)),
-    }
-}
-
-fn centre_uv(x: usize, y: usize, size: usize) -> [f32; 2] {
-    let along = |at: usize| (at as f64 + 0.5) / size as f64;
-    [along(x) as f32, (1.0 - along(y)) as f32]
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -167,11 +153,9 @@ mod tests {
     use glam::{DVec3, Vec2};
     use mateval_dataset::material::{ColorInput, Material, MaterialModel};
     use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
-    use mateval_dataset::{Camera, InstanceId, Intrinsics, SceneId};
+    use mateval_dataset::{Camera, Intrinsics, TriangleMesh};
     use mateval_image::{Picture, Texels, Wrap, png_io};
-    use mateval_submission::atlas::AtlasMeshes;
-    use mateval_submission::prediction::read_scene;
-    use serde_json::json;
+    use mateval_tracer::World;
 
     use super::*;
 
@@ -259,7 +243,7 @@ mod tests {
         let [observed, _] = compare(&map, &prediction, &truth);
         let square = f64::from(0.2_f32).powi(2);
         assert!((observed.errors().base_color_mse.unwrap() / square - 0.75).abs() < 1e-6);
-        let texels: Vec<SurfaceTexel> = (0..64).flat_map(|y| map.row(y)).collect();
+        let texels: Vec<_> = (0..64).flat_map(|y| map.row(y)).collect();
         let wrong_texels = texels.iter().filter(|texel| texel.column >= 30).count();
         assert_eq!(2 * wrong_texels, texels.len());
     }
@@ -275,60 +259,33 @@ mod tests {
         assert!((observed.errors().base_color_mse.unwrap() - 0.03).abs() < 1e-7);
     }
 
-    /// A dataset's scene of one instance of 64 texels a side, and a submission of its truth.
-    fn on_disk() -> (tempfile::TempDir, SceneFolder, SceneFile) {
-        let folder = tempfile::tempdir().unwrap();
-        let scene = SceneFolder::of(folder.path(), &SceneId::new("s").unwrap());
-        let submitted = folder.path().join("submission/scenes/s/a");
-        let instance = InstanceId::new("a").unwrap();
-        for place in [scene.truth_material(&instance), submitted] {
-            std::fs::create_dir_all(&place).unwrap();
-            let bytes = Picture::from_fn(64, 64, |x, y| (x + 2 * y) as u8);
-            png_io::write_rgb_bytes(&place.join("base_color.png"), &bytes.map(|v| [v, 9, 255 - v])).unwrap();
-            png_io::write_grey_bytes(&place.join("roughness.png"), &bytes).unwrap();
-            png_io::write_ids(&place.join("metallic.png"), &Picture::filled(64, 64, 30_000)).unwrap();
-        }
-        let atlas = json!({"size": 64, "charts": 1, "coverage": 0.5, "texel_m": 0.1, "half_pixel_m": null});
-        let file = json!({
-            "format": "mateval/3", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
-                       "states_metallic": true, "files": []},
-            "lights": "own", "materials": "converted", "exposure": 1.0,
-            "views": [{"id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera()}],
-            "instances": [{"id": "a", "index": 1, "name": "a", "role": {"type": "other"}, "category": null,
-                           "super_category": null, "triangles": 2, "atlas": atlas}],
-            "parts": [], "part_sets": [], "findings": [],
-        });
-        (folder, scene, serde_json::from_value(file).unwrap())
-    }
-
-    fn compared(
-        folder: &SceneFolder,
-        scene: &SceneFile,
-        submission: &std::path::Path,
-    ) -> Result<Vec<Vec<InstanceTexelErrors>>, EvalError> {
-        let mesh = mesh([1.0, 1.0]);
-        let meshes = [mesh];
-        let atlases = AtlasMeshes::in_memory(&meshes);
-        let submissions = [submission, std::path::Path::new("nowhere")];
-        let submissions = submissions.map(|path| read_scene(path, scene, &atlases).unwrap());
-        texture_space(folder, scene, &world(&meshes[0]), &meshes, &submissions, None, &|_| ())
-    }
-
+    /// By the scene of the published examples.
     #[test]
     fn an_unsound_truth_is_an_error_that_says_which() {
-        let (root, folder, mut scene) = on_disk();
-        let submission = root.path().join("submission");
+        let example = include_str!("../../../../dataset_spec/examples/scene.json");
+        let mut scene: SceneFile = serde_json::from_str(example).unwrap();
+        let root = tempfile::tempdir().unwrap();
+        let folder = SceneFolder::of(root.path(), &scene.id);
         let instance = scene.instances[0].id.clone();
-        let roughness = folder.truth_material(&instance).join("roughness.png");
-        png_io::write_grey_bytes(&roughness, &Picture::filled(128, 128, 9)).unwrap();
-        let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
+        let maps = folder.truth_material(&instance);
+        std::fs::create_dir_all(&maps).unwrap();
+        png_io::write_rgb_bytes(&maps.join("base_color.png"), &Picture::filled(64, 64, [9; 3])).unwrap();
+        for (map, size) in [("roughness", 128), ("metallic", 64)] {
+            let path = maps.join(map).with_extension("png");
+            png_io::write_grey_bytes(&path, &Picture::filled(size, size, 9)).unwrap();
+        }
+        let refused = || true_material(&folder, &instance, 64).unwrap_err().to_string();
+        let text = refused();
         assert!(text.contains("roughness.png': expected 64x64 texels, as scene.json states, found 128x128"), "{text}");
-        std::fs::remove_file(&roughness).unwrap();
-        assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("roughness.png"));
+        std::fs::remove_file(maps.join("roughness.png")).unwrap();
+        assert!(refused().contains("roughness.png"));
         scene.instances[0].atlas.as_mut().unwrap().size = 1 << 20;
-        let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
-        assert!(text.contains("instance 'a': expected an atlas of 64 to 4096 texels a side, found 1048576"), "{text}");
+        let text = checked_size(&folder, &scene.instances[0]).unwrap_err().to_string();
+        let expected = format!("instance '{instance}': expected an atlas of 64 to 4096 texels a side, found 1048576");
+        assert!(text.contains(&expected), "{text}");
         scene.views.clear();
-        assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("expected an input view"));
+        let open = OpenScene { folder: folder.clone(), world: world(&mesh([1.0; 2])), atlases: Vec::new() };
+        let found = texture_space(&open, &scene, &[], None, &|_| ());
+        assert!(found.unwrap_err().to_string().contains("expected an input view"));
     }
 }

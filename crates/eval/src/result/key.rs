@@ -67,7 +67,7 @@ impl Views {
 }
 
 /// What is compared and on which surfaces, as in `albedo` or `rgb_true_specular`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct PictureName {
     pub kind: PictureKind,
@@ -184,18 +184,6 @@ impl fmt::Display for ResultKey {
 by_text!(PictureName, UnknownWord, "^[a-z_]+$");
 by_text!(ResultKey, BadResultKey, "^[a-z_]+\\.[a-z_]+\\.[a-z0-9_]+$");
 
-impl Ord for PictureName {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.to_string().cmp(&other.to_string())
-    }
-}
-
-impl PartialOrd for PictureName {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 /// The headline numbers first, all others in the order of their texts: the order of a result's keys.
 impl Ord for ResultKey {
     fn cmp(&self, other: &Self) -> Ordering {
@@ -271,18 +259,6 @@ mod tests {
         ] {
             let error = text.parse::<ResultKey>().unwrap_err().to_string();
             assert!(error.contains(unknown), "{error}");
-        }
-    }
-
-    /// The published example of a result holds only known keys; its twins with an unknown word are refused.
-    #[test]
-    fn the_published_example_holds_known_keys_alone() {
-        let text = include_str!("../../../../dataset_spec/examples/result.json");
-        let read = |text: &str| serde_json::from_str::<crate::result::ResultFile>(text).map_err(|e| e.to_string());
-        assert!(read(text).unwrap().protocols["mateval-3"].summary.len() >= 4);
-        for twin in ["albedo.input.mze", "albido.input.mse", "albedo.inputs.mse"] {
-            let error = read(&text.replace("albedo.input.mse", twin)).unwrap_err();
-            assert!(error.contains(&format!("'{twin}' is not a key of a result")), "{error}");
         }
     }
 }

@@ -96,7 +96,7 @@ fn results() -> Results {
         std::iter::once(truth.as_path()).chain(places.iter().map(|(.., place)| place.as_path())).collect();
     let mut protocol = hasty();
     // The same for all, and enough that small damage shows under every light.
-    (protocol.light.samples.least, protocol.light.samples.most) = (16, 16);
+    protocol.light.samples.each_half = 16;
     let mut all = scored(&plan(&submissions, &protocol, &[]))
         .into_iter()
         .map(|mut result| result.protocols.remove("mateval-3").unwrap());

@@ -66,7 +66,7 @@ fn basis_of(
     let repaint = Repaint::new(world, atlases, (0..atlases.len()).map(coat).collect(), flavour()).unwrap();
     let settings = RenderSettings { samples, ..Default::default() };
     let done = render_repainted(world, &repaint, &[camera], Lighting::Apart, &settings, &[seed], &|_, _| ());
-    done.unwrap().remove(0).views.remove(0).halves.remove(0)
+    done.unwrap().remove(0).views.remove(0).by_seed.remove(0)
 }
 
 /// The planted radiance: 0.5 to 3.5, different in every channel.

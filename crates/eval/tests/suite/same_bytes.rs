@@ -62,7 +62,7 @@ fn with_any_other_submissions() {
     // The twins: methods differ, and so do numbers of samples.
     assert!(together[0] != together[1] && together[0] != together[2]);
     let mut fewer = hasty();
-    (fewer.light.samples.least, fewer.light.samples.most) = (2, 2);
+    fewer.light.samples.each_half = 2;
     // Those of the truth itself do not depend on samples.
     let pictures = |protocol| scored(&plan(&[dark], &protocol, &["room"]))[0].protocols["mateval-3"].pictures.clone();
     assert!(pictures(hasty()) != pictures(fewer));

@@ -26,7 +26,7 @@ pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) 
 pub fn hasty() -> Protocol {
     let mut protocol = Protocol::named("mateval-3").unwrap();
     protocol.light.fit.samples = 4;
-    (protocol.light.samples.least, protocol.light.samples.most) = (4, 4);
+    protocol.light.samples.each_half = 4;
     protocol
 }
 

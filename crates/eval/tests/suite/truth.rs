@@ -17,7 +17,7 @@ use super::sample::{hasty, lpips, plan, scored, write_changed, write_grey, write
 
 fn samples(each_half: u32, seed: &str) -> Protocol {
     let mut protocol = hasty();
-    (protocol.light.samples.least, protocol.light.samples.most) = (each_half, each_half);
+    protocol.light.samples.each_half = each_half;
     protocol.light.samples.seed = seed.to_owned();
     protocol
 }

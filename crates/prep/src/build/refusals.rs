@@ -198,7 +198,7 @@ pub(super) fn is_lit(plan: &Plan, exposure: f64) -> Result<bool, PrepError> {
     for samples in LIGHT_SAMPLES {
         let settings = RenderSettings { samples, ..RenderSettings::default() };
         let render = render_views(&world, &[camera], &settings, &[0], &|_, _| {})?;
-        let sums = render.views[0].halves.iter().map(LightBasis::sum);
+        let sums = render.views[0].by_seed.iter().map(LightBasis::sum);
         if sums
             .flat_map(|sum| sum.pixels().to_vec())
             .any(|pixel| pixel.0.iter().any(|value| exposure * f64::from(*value) >= LEAST_LIGHT))

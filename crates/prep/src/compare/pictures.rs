@@ -179,7 +179,7 @@ fn render_pass(
 }
 
 fn light_of(view: &ViewLight) -> OurLight {
-    let [a, b] = [0, 1].map(|half| &view.halves[half]);
+    let [a, b] = [0, 1].map(|half| &view.by_seed[half]);
     let groups = a.pictures().iter().zip(b.pictures());
     let groups = groups.map(|(a, b)| Halves { a: a.clone(), b: b.clone() }).collect();
     OurLight { rgb: Halves { a: a.sum(), b: b.sum() }, groups }

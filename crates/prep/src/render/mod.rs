@@ -199,7 +199,7 @@ fn render_scene(
         let shown = |done: usize, all: usize| progress(Report::step(&step, done, all));
         let settings = RenderSettings { samples: run.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
         let mut render = render_views(world, &[view.camera], &settings, &seeds, &shown)?;
-        let [a, b]: [LightPictures; 2] = std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0)));
+        let [a, b]: [LightPictures; 2] = std::array::from_fn(|_| light_pictures(render.views[0].by_seed.remove(0)));
         let shown = without_noise(&folder, view, [&a, &b])?;
         report.remarks.extend(remark(&format!("{id} {}", view.id), &render.stats));
         let file = RenderFile {

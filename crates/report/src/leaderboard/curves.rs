@@ -10,7 +10,6 @@ use mateval_dataset::layout::INPUT;
 use mateval_dataset::{SceneId, ViewId};
 use mateval_eval::metric::Metric;
 use mateval_eval::result::PictureValues;
-use mateval_eval::result::constancy::ConstancyMeans;
 use mateval_eval::result::key::PictureName;
 use minijinja::context;
 use minijinja::value::Serde;
@@ -21,6 +20,7 @@ use super::columns::{Column, headlines, least_span};
 use super::entries::is_in_curves;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
+use crate::tables::layouts::ConstancyMeans;
 use crate::titles::Titled;
 
 /// Classes of the share of pixels that the input view does not show.

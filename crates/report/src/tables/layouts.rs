@@ -4,7 +4,7 @@ use mateval_eval::metric::PictureKind::{
     Albedo, AlbedoAligned, Metallic, RgbFitted, RgbRelit, RgbTrue, Roughness, TextureBaseColor,
 };
 use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
-use mateval_eval::result::constancy::{Constancy, ConstancyMeans};
+use mateval_eval::result::constancy::{Constancy, Deviation};
 use mateval_eval::result::key::Views::{Input, Novel, Observed, Unobserved, Wide, WideUnobserved};
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 
@@ -55,6 +55,41 @@ impl ConstancyNumber {
             Self::DeltaE | Self::MeanDeltaE => Metric::DeltaE.style(),
             Self::MeanPsnr => Metric::Psnr.style(),
         }
+    }
+}
+
+/// The means of a submission over its families.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ConstancyMeans {
+    /// Root mean square of linear deviations: raw, then aligned.
+    pub(crate) linear: [f64; 2],
+    /// Root mean square in CIEDE2000: raw, then aligned.
+    pub(crate) delta_e: [f64; 2],
+    /// Raw, then aligned; the mean over the families that have a value.
+    pub(crate) relative: [Option<f64>; 2],
+    /// PSNR in dB of the families' means: the mean over families.
+    pub(crate) mean_psnr: f64,
+    pub(crate) mean_delta_e: f64,
+}
+
+impl ConstancyMeans {
+    /// Absent where there is no family.
+    pub(crate) fn of(families: &[Constancy]) -> Option<Self> {
+        let count = families.len();
+        let mean = |value: &dyn Fn(&Constancy) -> f64| families.iter().map(value).sum::<f64>() / count as f64;
+        let both = |value: fn(&Deviation) -> f64| [mean(&|f| value(&f.raw)), mean(&|f| value(&f.aligned))];
+        let relative = [|f: &Constancy| f.raw.relative, |f: &Constancy| f.aligned.relative].map(|of| {
+            let known: Vec<f64> = families.iter().filter_map(of).collect();
+            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+        });
+        let psnr = |f: &Constancy| mateval_metrics::Psnr::from_mse(f.mean_mse).map_or(0.0, |psnr| psnr.db);
+        (count > 0).then(|| Self {
+            linear: both(|deviation| deviation.linear),
+            delta_e: both(|deviation| deviation.delta_e),
+            relative,
+            mean_psnr: mean(&psnr),
+            mean_delta_e: mean(&|family| family.mean_delta_e),
+        })
     }
 }
 
@@ -252,4 +287,29 @@ pub(super) fn pooled() -> Vec<Layout> {
         blocks: views.map(|views| block(kind, views)).into(),
     };
     POOLED_PICTURES.map(layout).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_dataset::SceneId;
+    use mateval_dataset::lighting::LightingName;
+
+    use super::*;
+
+    #[test]
+    fn means_over_families_skip_what_has_no_value() {
+        let family = |relative, mse| Constancy {
+            scene: SceneId::new("s").unwrap(),
+            lightings: vec![LightingName::WarmCool],
+            area_m2: 1.0,
+            raw: Deviation { linear: 0.2, relative, ..Deviation::default() },
+            aligned: Deviation { linear: 0.1, ..Deviation::default() },
+            mean_mse: mse,
+            mean_delta_e: 3.0,
+        };
+        let found = ConstancyMeans::of(&[family(Some(0.5), 0.1), family(None, 0.001)]).unwrap();
+        assert_eq!((found.relative, found.linear), ([Some(0.5), None], [0.2, 0.1]));
+        assert!((found.mean_psnr - 20.0).abs() < 1e-12);
+        assert_eq!(ConstancyMeans::of(&[]), None);
+    }
 }

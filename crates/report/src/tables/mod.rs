@@ -5,7 +5,7 @@
 //! `formats` writes them.
 
 mod formats;
-mod layouts;
+pub(crate) mod layouts;
 mod table;
 #[cfg(test)]
 mod tests;

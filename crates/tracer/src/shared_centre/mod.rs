@@ -46,11 +46,11 @@ pub struct ViewsRender {
     pub stats: RenderStats,
 }
 
-/// The light that one camera sees, in independent halves (or as many parts as there were seeds).
+/// The light that one camera sees, once for each seed: independent pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewLight {
     /// In the order of the seeds.
-    pub halves: Vec<LightBasis>,
+    pub by_seed: Vec<LightBasis>,
 }
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
@@ -116,7 +116,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     where
         M: MaterialSource<'a, K> + Sync,
     {
-        let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
+        let blank = ViewLight { by_seed: Vec::with_capacity(self.seeds.len()) };
         let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.variants];
         let mut counts = Vec::new();
         // Expose every plane once per seed.
@@ -126,7 +126,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
                 let of_views = expose::<_, K>(self, &shared.plane, &settings, &mut counts, progress);
                 for (view, halves) in shared.views.iter().zip(of_views) {
                     for (views, half) in views.iter_mut().zip(halves) {
-                        views[*view].halves.push(half);
+                        views[*view].by_seed.push(half);
                     }
                 }
             }

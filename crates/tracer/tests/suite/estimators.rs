@@ -301,7 +301,7 @@ fn hashes(world: &World, threads: usize) -> [String; 2] {
         let picture = render(world, &views[0], &settings, &|_, _| ()).unwrap().picture;
         (picture, render_views(world, &views, &settings, &[4, 5], &|_, _| ()).unwrap().views)
     });
-    let halves = views.iter().flat_map(|view| &view.halves);
+    let halves = views.iter().flat_map(|view| &view.by_seed);
     [hash([&picture]), hash(halves.flat_map(LightBasis::pictures))]
 }
 

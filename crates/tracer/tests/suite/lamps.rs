@@ -209,7 +209,7 @@ fn a_weighted_basis_is_a_render() {
     let basis = |world: &World| -> LightBasis {
         let views = [view(), view().turned(5.0, -5.0)];
         let mut done = render_views(world, &views, &settings(8, 0), &[5], &|_, _| ()).unwrap();
-        done.views.remove(1).halves.remove(0)
+        done.views.remove(1).by_seed.remove(0)
     };
     let apart = basis(&lit([[1.0; 3]; 2]));
     let direct = basis(&lit([[0.2, 0.5, 3.0], [0.7; 3]])).sum();

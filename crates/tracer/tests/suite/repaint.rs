@@ -107,7 +107,7 @@ fn two_roughnesses_share_paths_without_bias() {
             render_repainted(&world, repaint, &[view(32)], Lighting::Apart, &settings, &seeds, &|_, _| ()).unwrap();
         let pictures = |render: ViewsRender| {
             let [view] = <[_; 1]>::try_from(render.views).unwrap();
-            Renders::from_pictures(view.halves.iter().map(LightBasis::sum))
+            Renders::from_pictures(view.by_seed.iter().map(LightBasis::sum))
         };
         done.into_iter().map(pictures).collect()
     };
@@ -137,8 +137,8 @@ fn mixes_are_those_of_the_basis() {
     let mixed = repainted(&world, &repaint, Lighting::Mixed(&mixes));
     for (k, apart) in repainted(&world, &repaint, Lighting::Apart).iter().enumerate() {
         for (picture, mix) in mixes[k].iter().enumerate() {
-            let expected = apart.views[0].halves[1].weighted(mix).unwrap();
-            let found = &mixed[k].views[0].halves[1].pictures()[picture];
+            let expected = apart.views[0].by_seed[1].weighted(mix).unwrap();
+            let found = &mixed[k].views[0].by_seed[1].pictures()[picture];
             let pairs = expected.pixels().iter().zip(found.pixels());
             for (a, b) in pairs.flat_map(|(a, b)| a.0.into_iter().zip(b.0)) {
                 assert!((a - b).abs() <= 1e-5 * a.max(0.1), "{a} {b}");

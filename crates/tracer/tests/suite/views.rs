@@ -51,7 +51,7 @@ fn basis(world: &World, seed: u64, samples: u32) -> LightBasis {
     let settings = RenderSettings { samples, ..Default::default() };
     let mut done = render_views(world, &[view(32)], &settings, &[seed], &|_, _| ()).unwrap();
     assert_eq!(done.stats.not_finite, 0);
-    done.views.remove(0).halves.remove(0)
+    done.views.remove(0).by_seed.remove(0)
 }
 
 /// The largest difference between two pictures, relative to the mean of the first.
@@ -127,7 +127,7 @@ fn rendered(world: &World, cameras: &[Camera], samples: u32, seeds: std::ops::Ra
 
 /// The estimates of each view, one per seed.
 fn estimates(done: &ViewsRender) -> Vec<Renders> {
-    let of = |view: &mateval_tracer::ViewLight| Renders::from_pictures(view.halves.iter().map(LightBasis::sum));
+    let of = |view: &mateval_tracer::ViewLight| Renders::from_pictures(view.by_seed.iter().map(LightBasis::sum));
     done.views.iter().map(of).collect()
 }
 
@@ -288,7 +288,7 @@ fn every_pixel_gets_its_samples() {
     assert!(has_one_group(&cameras));
     let done = rendered(&world, &cameras, 64, 3..4);
     for (index, view) in done.views.iter().enumerate() {
-        let picture = view.halves[0].sum();
+        let picture = view.by_seed[0].sum();
         let shares = picture.pixels().iter().map(|pixel| f64::from(pixel.0[0]));
         let (low, high) = shares.clone().fold((f64::MAX, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
         let mean = shares.sum::<f64>() / (48.0 * 48.0);
@@ -303,7 +303,7 @@ fn a_half_depends_on_its_own_seed() {
     let world = lit_world([[1.0; 3]; 4]);
     let halves = |seeds: &[u64]| {
         let mut views = render_views(&world, &views(), &settings(3), seeds, &|_, _| ()).unwrap().views;
-        views.swap_remove(0).halves
+        views.swap_remove(0).by_seed
     };
     let (one, other) = (halves(&[4, 5]), halves(&[4, 6]));
     assert_eq!(one[0], other[0]);
@@ -352,7 +352,7 @@ fn views_may_differ_in_size() {
     let cameras = [view(SIZE as u32), fine];
     assert!(has_one_group(&cameras));
     let done = rendered(&world, &cameras, 8, 0..8);
-    let picture = done.views[1].halves[0].sum();
+    let picture = done.views[1].by_seed[0].sum();
     assert_eq!((picture.width(), picture.height()), (48, 40));
     let separate = Renders::new(&world, &fine, RenderSettings { seed: 7, ..settings(8) }, 8);
     let z = estimates(&done)[1].whole().z_against(&separate.whole());
@@ -380,7 +380,7 @@ fn small_pictures_lose_nothing() {
     assert!(has_one_group(&cameras));
     let done = render_views(&world, &cameras, &settings(16), &[1], &|_, _| ()).unwrap();
     for view in &done.views {
-        for pixel in view.halves[0].sum().pixels() {
+        for pixel in view.by_seed[0].sum().pixels() {
             assert!((pixel.0[0] - 1.0).abs() < 0.3, "{pixel:?}");
         }
     }
