@@ -109,7 +109,7 @@ pub(crate) fn other_proportions(
          outside its own proportions"
     } else {
         "scale it back to the view's proportions; if it cuts off a part of the view, save its pictures and lift them with \
-         an adapter that states placement = \"centre_crop\": mateval baseline nn --estimate FOLDER --adapter FILE.toml"
+         an adapter that states placement = \"centre_crop\": `mateval baseline nn --estimate FOLDER --adapter FILE.toml`"
     };
     BaselineError::Unusable(format!(
         "the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions, within 5 %; \

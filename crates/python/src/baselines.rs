@@ -50,7 +50,8 @@ struct MadeMaps {
 ///
 /// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
 /// not be the view's. At least one of them must be given. encoding says how base_color is stored: "linear" or "srgb";
-/// by default floats are linear, and uint8 and uint16 are sRGB.
+/// by default floats are linear, and uint8 and uint16 are sRGB. Floats must be finite in every pixel, also where the view is
+/// not valid; they are clipped to 0 to 1.
 ///
 /// neighbours is the number of seen points that an unseen texel is computed from, normal_weight the distance in metres
 /// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side

@@ -129,7 +129,7 @@ impl View {
         self.ids(py, &part_picture(None))
     }
 
-    /// Whether each pixel counts: (height, width), bool.
+    /// Whether each pixel counts: (height, width), bool. See "Pictures of a view" of the dataset's format for the rule.
     #[getter]
     fn valid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         plane(py, self.mask(py, "valid.png")?)

@@ -178,8 +178,12 @@ def test_views_are_a_map_style_dataset(dataset, scene):
     assert len(pickle.loads(pickle.dumps(views))) == 1
     with pytest.raises(IndexError):
         views[1]
-    with pytest.raises(ValueError, match="fields: expected arrays of View, .* found 'colour'"):
-        mateval.torch.Views(dataset, fields=["colour"])
+    cameras = mateval.torch.Views(dataset, fields=["camera.K", "camera.world_from_camera"])
+    assert cameras[0]["camera.K"].shape == (3, 3) and cameras[0]["camera.world_from_camera"].shape == (4, 4)
+    # The camera itself is no array.
+    for other in ("colour", "normals", "camera", "truth"):
+        with pytest.raises(ValueError, match=f"fields: expected arrays of a view .*normal.*, found '{other}'"):
+            mateval.torch.Views(dataset, fields=[other])
     with pytest.raises(TypeError, match=r"fields: expected a list such as \['rgb'\]"):
         mateval.torch.Views(dataset, fields="rgb")
     with pytest.raises(mateval.UnknownId, match="has no view 'left'"):

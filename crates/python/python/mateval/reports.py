@@ -208,7 +208,8 @@ def rank(results: Iterable[Result], key: str = "albedo.novel.psnr") -> Any:
     results = _results(results)
     ranking = json.loads(_core.rank([result.json for result in results], results[0].protocol))
     if key not in ranking["keys"]:
-        raise UnknownId(_nearest(f"no result has a mean '{key}'", key, ranking["keys"]))
+        text = f"no result has a mean '{key}' (Result.missing says what was not computed)"
+        raise UnknownId(_nearest(text, key, ranking["keys"]))
     names = {method["id"]: method["method"] for method in ranking["methods"]}
     best_first = ranking["keys"][key]["better"] == "higher"
     standings = sorted(

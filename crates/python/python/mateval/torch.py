@@ -6,15 +6,21 @@ import operator
 from collections.abc import Iterable
 from typing import Any
 
-from . import _core
 from .dataset import Dataset, DatasetOrPath, open
+
+#: Every array of a view, of its camera and of its truth.
+_FIELDS = (
+    *("rgb", "preview", "depth", "normal", "instance", "part", "valid", "unobserved"),
+    *("camera.K", "camera.world_from_camera", "camera.opencv"),
+    *("truth.albedo", "truth.diffuse_albedo", "truth.roughness", "truth.metallic", "truth.specular_region", "truth.rgb"),
+)
 
 
 class Views:
     """A map-style dataset for ``torch.utils.data.DataLoader``: one item a view, a dictionary of arrays.
 
-    ``dataset`` is a dataset or its folder. ``fields`` are names of ``View``'s arrays, or of ``Truth``'s as in
-    ``truth.albedo``. ``views`` are the ids of the views that are taken from every scene; by default the input view alone,
+    ``dataset`` is a dataset or its folder. ``fields`` are names of ``View``'s arrays, or of others' as in ``truth.albedo``
+    and ``camera.K``; ids of ``instance`` and ``part`` are uint16, which most of PyTorch's functions take as int64 alone. ``views`` are the ids of the views that are taken from every scene; by default the input view alone,
     since methods see no other photo. An item also holds the ids ``scene`` and ``view``. Pictures of different scenes may
     differ in size: such batches need a ``collate_fn``.
 
@@ -47,6 +53,10 @@ class Views:
 class Scenes:
     """The same with one item a scene: each field is an array of all its views, or of those named, in the order of their
     ids in ``view``. The photo, ``rgb`` and ``preview``, exists for the input view alone and has no such axis.
+
+    >>> scenes = mateval.torch.Scenes("DATASET", fields=["rgb", "depth"])
+    >>> for batch in torch.utils.data.DataLoader(scenes, batch_size=2):
+    ...     photo, depth = batch["rgb"], batch["depth"]  # (2, height, width, 3), (2, views, height, width)
     """
 
     def __init__(
@@ -82,10 +92,8 @@ class Scenes:
 def _fields(given: Iterable[str]) -> tuple[str, ...]:
     fields = _list("fields", given)
     for field in fields:
-        in_truth = field.startswith("truth.")
-        holder, name = (_core.Truth, field[len("truth.") :]) if in_truth else (_core.View, field)
-        if name.startswith("_") or not hasattr(holder, name):
-            raise ValueError(f"fields: expected arrays of View, or of Truth as in 'truth.albedo', found '{field}'")
+        if field not in _FIELDS:
+            raise ValueError(f"fields: expected arrays of a view ({', '.join(_FIELDS)}), found '{field}'")
     return fields
 
 
