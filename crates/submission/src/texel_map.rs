@@ -89,16 +89,16 @@ impl TexelMap {
     pub fn value(&self, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
         match (texture.width(), texel.off_centre) {
             (1, _) => texture.texel(0, 0),
-            (_, Some(uv)) => texture.sample(uv),
             // The centre of its own texel: exactly, where a uv might be rounded.
             (size, None) if size == self.size => texture.texel(texel.column, y),
-            _ => texture.sample(self.centre_uv(texel.column, y)),
+            _ => texture.sample(self.uv(texel, y)),
         }
     }
 
-    fn centre_uv(&self, x: usize, y: usize) -> [f32; 2] {
+    /// The uv of the place that represents a texel in row `y`.
+    pub fn uv(&self, texel: &SurfaceTexel, y: usize) -> [f32; 2] {
         let along = |at: usize| (at as f64 + 0.5) / self.size as f64;
-        [along(x) as f32, (1.0 - along(y)) as f32]
+        texel.off_centre.unwrap_or_else(|| [along(texel.column) as f32, (1.0 - along(y)) as f32])
     }
 }
 

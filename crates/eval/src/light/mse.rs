@@ -102,8 +102,8 @@ impl LightMse {
         self.mse < self.bounded()
     }
 
-    /// The PSNR of [`Self::bounded`]: continuous in `mse`, and never higher where `mse` is. It is exact where neither error nor noise
-    /// is left.
+    /// The PSNR of [`Self::bounded`], which is continuous in `mse` and never rises with it. It is exact where neither
+    /// error nor noise is left.
     pub fn psnr(&self) -> Result<Psnr, MetricError> {
         Psnr::from_mse(self.bounded())
     }

@@ -47,7 +47,7 @@ pub fn material_pictures(
     wanted: Places,
 ) -> Vec<MaterialPictures> {
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-    // None where the instance has no atlas.
+    // Absent if the instance has no atlas.
     let lookup = |hit: Hit| Some((hit.surface.0, atlases[hit.surface.0].uv_at(hit.triangle.0, hit.barycentrics)?));
     let row = |y: usize| {
         let coarse = places_through(world, camera, (0..width).flat_map(|x| coarse_subpixels(x, y)));

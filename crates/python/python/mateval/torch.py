@@ -19,10 +19,11 @@ _FIELDS = (
 class Views:
     """A map-style dataset for ``torch.utils.data.DataLoader``: one item a view, a dictionary of arrays.
 
-    ``dataset`` is a dataset or its folder. ``fields`` are names of ``View``'s arrays, or of others' as in ``truth.albedo``
-    and ``camera.K``; ids of ``instance`` and ``part`` are uint16, which most of PyTorch's functions take as int64 alone. ``views`` are the ids of the views that are taken from every scene; by default the input view alone,
-    since methods see no other photo. An item also holds the ids ``scene`` and ``view``. Pictures of different scenes may
-    differ in size: such batches need a ``collate_fn``.
+    ``dataset`` is a dataset or its folder. ``fields`` are names of ``View``'s arrays, or of others' as in
+    ``truth.albedo`` and ``camera.K``; ids of ``instance`` and ``part`` are uint16, which most of PyTorch's functions
+    take as int64 alone. ``views`` are the ids of the views that are taken from every scene; by default the input view
+    alone, since methods see no other photo. An item also holds the ids ``scene`` and ``view``. Pictures of different
+    scenes may differ in size: such batches need a ``collate_fn``.
 
     >>> views = mateval.torch.Views("DATASET", fields=["rgb", "depth", "normal", "valid", "truth.albedo"])
     >>> for batch in torch.utils.data.DataLoader(views, batch_size=8, num_workers=4):

@@ -20,7 +20,7 @@ use super::columns::{Column, headlines, least_span};
 use super::entries::is_in_curves;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
-use crate::tables::layouts::ConstancyMeans;
+use crate::tables::ConstancyMeans;
 use crate::titles::Titled;
 
 /// Classes of the share of pixels that the input view does not show.

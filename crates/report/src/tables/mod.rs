@@ -5,14 +5,14 @@
 //! `formats` writes them.
 
 mod formats;
-pub(crate) mod layouts;
+mod layouts;
 mod table;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use formats::quoted;
 pub use layouts::Grouping;
-pub(crate) use layouts::{BlockWords, CellKey, PAPER, TableWords, Value};
+pub(crate) use layouts::{BlockWords, CellKey, ConstancyMeans, PAPER, TableWords, Value};
 pub(crate) use table::pooled;
 
 use crate::error::{Mismatch, ReportError};

@@ -149,10 +149,9 @@ impl<'a> Eye<'a> {
 fn coarse_texels(world: &World, instance: usize, camera: &Camera) -> Vec<CoarseTexel> {
     let mesh: &TriangleMesh = &world.scene().surfaces[instance].mesh;
     let map = TexelMap::new(world, SurfaceIndex(instance), mesh, COARSE, camera);
-    let along = |at: usize| (at as f32 + 0.5) / COARSE as f32;
     let texels = (0..COARSE).flat_map(|y| map.row(y).map(move |texel| (y, texel)));
     let coarse = |(y, texel): (usize, SurfaceTexel)| CoarseTexel {
-        uv: texel.off_centre.unwrap_or([along(texel.column), 1.0 - along(y)]),
+        uv: map.uv(&texel, y),
         area_m2: texel.area_m2,
         observed: texel.observed,
     };
