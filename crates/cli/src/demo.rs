@@ -81,7 +81,7 @@ pub struct DemoArgs {
     /// Folder for everything that the demo makes. A demo that was interrupted there resumes.
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
-    /// Samples per pixel of each half of a rendered picture [default: 24; with --full 64].
+    /// Samples per pixel of each half of a rendered picture [default: 8; with --full 64].
     #[arg(long, value_parser = samples_parser())]
     samples: Option<u32>,
     /// The renderer [default: blender, or builtin where Blender is not installed].
@@ -102,11 +102,8 @@ pub struct DemoArgs {
 
 /// Steps from the sample to the leaderboard.
 const STEPS: u8 = 6;
-/// Samples per pixel of each half of the leaderboard's lit pictures: with fewer, the filter that takes out their noise
-/// would blur what the prediction adds to the reference.
-const SHOWN_SAMPLES: u32 = 16;
 /// Samples per pixel of each half of the scorer's reference: fewer than a release has, as befits its small views. A demo
-/// with few samples has at most twice as many here.
+/// with few samples has at most four times as many here.
 const REFERENCE_SAMPLES: u32 = 32;
 /// Width and height of a view: large enough to look at, and rendered in seconds.
 const SMALL: [u32; 2] = [160, 120];
@@ -172,7 +169,7 @@ impl DemoArgs {
         let options = Options {
             tool: TOOL.to_owned(),
             renderer: kind,
-            samples: self.samples.unwrap_or(if self.full { 64 } else { 24 }),
+            samples: self.samples.unwrap_or(if self.full { 64 } else { 8 }),
             resolution: if self.full { LARGE } else { SMALL },
             baselines: self.baselines(),
             lpips: matches!(lpips, LpipsWeights::Loaded(_)),
@@ -324,7 +321,7 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
         bail!("{failed} could not be rendered; run the demo again to go on from here");
     }
     let reference_options =
-        ReferenceOptions { samples: REFERENCE_SAMPLES.min(2 * options.samples), scenes: Vec::new(), force: false };
+        ReferenceOptions { samples: REFERENCE_SAMPLES.min(4 * options.samples), scenes: Vec::new(), force: false };
     let references = with_progress(|progress| make_references(&places.dataset, &reference_options, progress))
         .context("cannot render the scorer's references")?;
     if references.rendered > 0 {
@@ -411,7 +408,8 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
     let results = ranked.iter().map(|baseline| places.result(*baseline)).collect();
     let entries =
         entries::read(&ResultsFolder { results, ceiling, ..ResultsFolder::default() }, &TrustedKeys::default())?;
-    let samples = SHOWN_SAMPLES.min(options.samples);
+    // The pictures that SSIM and LPIPS compare.
+    let samples = Protocol::named(PROTOCOL)?.light.samples.each_half.min(options.samples);
     let plan = LeaderboardPlan {
         results: &entries.results,
         ceiling: entries.ceiling.as_ref(),

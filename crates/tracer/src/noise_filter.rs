@@ -99,24 +99,27 @@ fn filter(surfaces: &Surfaces<'_>, pixel: impl Fn([usize; 2]) -> Light + Sync) -
 fn visit_around(
     surfaces: &Surfaces<'_>,
     [x, y]: [usize; 2],
-    step: isize,
-    reach: isize,
+    step: usize,
+    reach: usize,
     mut visit: impl FnMut(usize, f32),
 ) {
     let (width, height) = (surfaces.valid.width(), surfaces.valid.height());
     let (valid, instances, normals) = (surfaces.valid.pixels(), surfaces.instances.pixels(), surfaces.normals.pixels());
     let here = y * width + x;
-    for dy in -reach..=reach {
-        let Some(row) = y.checked_add_signed(step * dy).filter(|&row| row < height) else { continue };
-        for dx in -reach..=reach {
-            let Some(column) = x.checked_add_signed(step * dx).filter(|&column| column < width) else { continue };
+    // The places along a row or column that stay in the picture, with their distance in steps.
+    let along = |at: usize, size: usize| {
+        let [back, on] = [at / step, (size - 1 - at) / step].map(|steps| steps.min(reach));
+        (0..=back + on).map(move |place| (at + place * step - back * step, place.abs_diff(back)))
+    };
+    for (row, dy) in along(y, height) {
+        for (column, dx) in along(x, width) {
             let there = row * width + column;
             if !valid[there] || instances[there] != instances[here] {
                 continue;
             }
             let cosine: f32 = (0..3).map(|c| normals[here].0[c] * normals[there].0[c]).sum();
             if there == here || cosine >= LEAST_COSINE {
-                visit(there, KERNEL[dx.unsigned_abs()] * KERNEL[dy.unsigned_abs()]);
+                visit(there, KERNEL[dx] * KERNEL[dy]);
             }
         }
     }
@@ -132,7 +135,7 @@ fn mean_variance(surfaces: &Surfaces<'_>, pixels: &[Light], at: [usize; 2]) -> f
 }
 
 /// One pass of the filter.
-fn smoothed(surfaces: &Surfaces<'_>, pixels: &[Light], at: [usize; 2], step: isize) -> Light {
+fn smoothed(surfaces: &Surfaces<'_>, pixels: &[Light], at: [usize; 2], step: usize) -> Light {
     let here = pixels[at[1] * surfaces.valid.width() + at[0]];
     let (own, allowed) = (luminance(here.value), DEVIATIONS * DEVIATIONS * here.variance);
     let (mut sum, mut variance, mut weights) = ([0.0; 3], 0.0, 0.0);

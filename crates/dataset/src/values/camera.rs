@@ -131,6 +131,11 @@ impl Camera {
         self.projection().project(world)
     }
 
+    /// The depth of a point along the camera's axis, in metres; not above 0 if it lies behind the camera.
+    pub fn depth(&self, world: DVec3) -> f64 {
+        (self.position() - world).dot(self.rotation().z_axis)
+    }
+
     pub fn projection(&self) -> Projection {
         Projection { camera_from_world: self.matrix().inverse(), intrinsics: self.intrinsics }
     }
@@ -179,8 +184,10 @@ mod tests {
     #[test]
     fn project_undoes_unproject() {
         let pixel = DVec2::new(13.25, 201.5);
-        let (back, depth) = camera().project(camera().unproject(pixel, 2.5)).unwrap();
+        let place = camera().unproject(pixel, 2.5);
+        let (back, depth) = camera().project(place).unwrap();
         assert!((back - pixel).length() < 1e-9 && (depth - 2.5).abs() < 1e-12);
+        assert!((camera().depth(place) - 2.5).abs() < 1e-12);
     }
 
     #[test]

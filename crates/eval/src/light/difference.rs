@@ -24,7 +24,6 @@
 //! is the mean of t. For the true maps q = t and r = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of
 //! paths.
 
-use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_tracer::noise_filter::{Surfaces, filtered_mean};
 use schemars::JsonSchema;
@@ -104,14 +103,22 @@ pub fn corrected_quarter(
     })
 }
 
-/// f: clips above 1 and encodes. Values below 0, which only noise has, continue the curve's straight part.
-pub fn encoded(value: f64) -> f64 {
-    f64::from(srgb_from_linear(value.min(1.0) as f32))
+/// f and f' of a value: the sRGB curve (IEC 61966-2-1) in double precision, clipped above 1, where its slope is 0. Below 0,
+/// which only noise is, the curve's straight part continues.
+fn encoded_with_slope(value: f64) -> (f64, f64) {
+    if value >= 1.0 {
+        (1.0, 0.0)
+    } else if value <= 0.0031308 {
+        (12.92 * value, 12.92)
+    } else {
+        let scaled = 1.055 * libm::pow(value, 1.0 / 2.4);
+        (scaled - 0.055, scaled / (2.4 * value))
+    }
 }
 
-/// f' of a value below 1.
-fn slope(value: f64) -> f64 {
-    if value <= 0.0031308 { 12.92 } else { 1.055 / 2.4 * libm::pow(value, 1.0 / 2.4 - 1.0) }
+/// f.
+pub fn encoded(value: f64) -> f64 {
+    encoded_with_slope(value).0
 }
 
 /// The difference of a view, from its four corrected quarters, those of the first half first.
@@ -120,7 +127,11 @@ pub fn difference(quarters: [&Picture<LinearRgb>; 4], guide: &ViewGuide<'_>) -> 
     let means = halves.map(|[first, second]| mean_of(first, second));
     let guided = [0, 1].map(|half| guided_mean(halves[half], guide));
     let scales = [0, 1].map(|half| scale(&means[half], guide));
-    let of_half = |half: usize| tangent(halves[half], &means[half], &guided[1 - half], scales[1 - half], guide);
+    let encoded_reference: Vec<[f64; 3]> =
+        guide.reference.pixels().iter().map(|LinearRgb(rgb)| rgb.map(|value| encoded(f64::from(value)))).collect();
+    let of_half = |half: usize| {
+        tangent(halves[half], &means[half], &guided[1 - half], scales[1 - half], guide, &encoded_reference)
+    };
     let ([first, u], [second, v]) = (of_half(0), of_half(1));
     let shown = guided_mean(means.each_ref(), guide).to_srgb();
     LightDifference { halves: [first, second], noise: [u, v], shown }
@@ -160,16 +171,15 @@ fn tangent(
     pivot: &Picture<LinearRgb>,
     scale: f64,
     guide: &ViewGuide<'_>,
+    encoded_reference: &[[f64; 3]],
 ) -> [Picture<SrgbRgb>; 2] {
     let DifferenceRules { pivot_factor, .. } = DIFFERENCE;
     let value = |at: usize, c: usize| -> [f32; 2] {
         let of = |picture: &Picture<LinearRgb>| f64::from(picture.pixels()[at].0[c]);
-        let reference = of(guide.reference);
-        let expected = scale * of(guide.ratio) * reference;
-        let p = of(pivot).clamp(expected / pivot_factor, expected * pivot_factor);
-        let slope = if p >= 1.0 { 0.0 } else { slope(p) };
-        let p = p.clamp(0.0, 1.0);
-        let x = encoded(p) + slope * (of(mean) - p) - encoded(reference);
+        let expected = scale * of(guide.ratio) * of(guide.reference);
+        let p = of(pivot).clamp(expected / pivot_factor, expected * pivot_factor).clamp(0.0, 1.0);
+        let (f, slope) = encoded_with_slope(p);
+        let x = f + slope * (of(mean) - p) - encoded_reference[at][c];
         [x as f32, (slope * 0.5 * (of(quarters[0]) - of(quarters[1]))) as f32]
     };
     let both = Picture::from_fn(mean.width(), mean.height(), |x, y| [0, 1, 2].map(|c| value(y * mean.width() + x, c)));

@@ -67,7 +67,7 @@ impl BlenderProgram {
         self.0.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python"))
     }
 
-    /// The command that runs `script` on `job`.
+    /// The command that runs `script` on `job`. Blender's temporary files lie beside the job.
     pub fn command(&self, script: &Path, job: &Path) -> Command {
         let mut command = Command::new(&self.0);
         match self.is_python() {
@@ -76,6 +76,8 @@ impl BlenderProgram {
             false => command.args(["--background", "--factory-startup", "--python"]).arg(script).arg("--").arg(job),
         };
         command.env("PYTHONDONTWRITEBYTECODE", "1");
+        // Scripts end at once and may be killed: Blender then leaves a folder behind wherever its temporary files are.
+        command.env("TMPDIR", job.parent().unwrap_or(job));
         command
     }
 }
