@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_dataset::{TriangleMesh, glb};
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::transfer::{byte_from_unit, linear_from_srgb_bytes};
+use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, Wrap, png_io};
 use serde_json::{Value, json};
 
@@ -169,7 +169,7 @@ fn is_byte(submission: &Path, instance: &str, map: &str, byte: u8) -> bool {
 }
 
 pub fn srgb(bytes: [u8; 3]) -> [f32; 3] {
-    bytes.map(|byte| linear_from_srgb_bytes()[usize::from(byte)])
+    bytes.map(mateval_image::transfer::linear_from_srgb_byte)
 }
 
 /// Slivers a few texels wide, under a texture four times as fine as the atlas: every texel finds a point of the mesh.

@@ -12,7 +12,7 @@ use mateval_baselines::lift::{Texel, lift, place_of};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::transfer::linear_from_srgb_bytes;
+use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_procedural::library::entry;
 use mateval_testkit::kept_folder;
@@ -101,7 +101,7 @@ fn floor_error(submission: &Path, moved: DVec3) -> f64 {
     for (x, y) in (0..size).flat_map(|y| (0..size).map(move |x| (x, y))) {
         let Some((triangle, true)) = atlas.owner(x, y) else { continue };
         let place = place_of(&atlas, mesh, triangle, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-        let baked = baked.get(x, y).map(|byte| linear_from_srgb_bytes()[usize::from(byte)]);
+        let baked = baked.get(x, y).map(linear_from_srgb_byte);
         let pairs = baked.iter().zip(check(place + moved));
         sum += pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / 3.0;
         count += 1.0;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use mateval_image::transfer::linear_from_srgb_bytes;
+use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{exr_io, png_io};
 use mateval_testkit::report_missing;
 use serde_json::Value;
@@ -97,7 +97,7 @@ fn greys_error_is_that_of_one_colour() {
     let albedo = exr_io::read_linear(&room.join("ground_truth/views/input/albedo.exr")).unwrap();
     let valid = png_io::read_mask(&room.join("views/input/valid.png")).unwrap();
     let error_of = |byte: u8| {
-        let grey = f64::from(linear_from_srgb_bytes()[usize::from(byte)]);
+        let grey = f64::from(linear_from_srgb_byte(byte));
         let pixels = albedo.pixels().iter().zip(valid.pixels()).filter(|(_, counts)| **counts);
         let errors: Vec<f64> = pixels.flat_map(|(rgb, _)| rgb.0.map(|v| (f64::from(v) - grey).powi(2))).collect();
         errors.iter().sum::<f64>() / errors.len() as f64

@@ -20,8 +20,7 @@ use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::progress::wrapped;
 use mateval_dataset::{Finding, Severity, json};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
-use mateval_eval::protocol::Protocol;
-use mateval_eval::protocol::Track;
+use mateval_eval::protocol::{Protocol, SCORER_VERSION, Track};
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_files::work_folder;
@@ -113,8 +112,11 @@ const LARGE: [u32; 2] = [320, 240];
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Options {
     tool: String,
+    scorer_version: u32,
     renderer: RendererKind,
     samples: u32,
+    /// Samples per pixel of each half of the scorer's reference.
+    reference_samples: u32,
     resolution: [u32; 2],
     baselines: Vec<DemoBaseline>,
     /// Whether the weights of LPIPS were found.
@@ -166,10 +168,13 @@ impl DemoArgs {
         let lpips = load_weights(Net::Alex);
         let earlier = earlier_options(&places)?;
         let (kind, renderer) = choose_renderer(self, earlier.as_ref())?;
+        let samples = self.samples.unwrap_or(if self.full { 64 } else { 8 });
         let options = Options {
             tool: TOOL.to_owned(),
+            scorer_version: SCORER_VERSION,
             renderer: kind,
-            samples: self.samples.unwrap_or(if self.full { 64 } else { 8 }),
+            samples,
+            reference_samples: REFERENCE_SAMPLES.min(4 * samples),
             resolution: if self.full { LARGE } else { SMALL },
             baselines: self.baselines(),
             lpips: matches!(lpips, LpipsWeights::Loaded(_)),
@@ -320,8 +325,7 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
         let failed = counted(report.failures.len(), "scene");
         bail!("{failed} could not be rendered; run the demo again to go on from here");
     }
-    let reference_options =
-        ReferenceOptions { samples: REFERENCE_SAMPLES.min(4 * options.samples), scenes: Vec::new(), force: false };
+    let reference_options = ReferenceOptions { samples: options.reference_samples, scenes: Vec::new(), force: false };
     let references = with_progress(|progress| make_references(&places.dataset, &reference_options, progress))
         .context("cannot render the scorer's references")?;
     if references.rendered > 0 {
@@ -409,7 +413,7 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
     let entries =
         entries::read(&ResultsFolder { results, ceiling, ..ResultsFolder::default() }, &TrustedKeys::default())?;
     // The pictures that SSIM and LPIPS compare.
-    let samples = Protocol::named(PROTOCOL)?.light.samples.each_half.min(options.samples);
+    let samples = Protocol::named(PROTOCOL)?.light.samples.each_half;
     let plan = LeaderboardPlan {
         results: &entries.results,
         ceiling: entries.ceiling.as_ref(),

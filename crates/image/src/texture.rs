@@ -9,7 +9,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::transfer::{linear_from_srgb_bytes, linear_from_srgb_words};
+use crate::transfer::{srgb_byte_table, srgb_word_table};
 
 /// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,8 +121,8 @@ impl Texture {
     pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
         let at = y * self.width + x;
         match self.texels.as_ref() {
-            Texels::Srgb8(v) => v[at].map(|byte| linear_from_srgb_bytes()[usize::from(byte)]),
-            Texels::Srgb16(v) => v[at].map(|word| linear_from_srgb_words()[usize::from(word)]),
+            Texels::Srgb8(v) => v[at].map(|byte| srgb_byte_table()[usize::from(byte)]),
+            Texels::Srgb16(v) => v[at].map(|word| srgb_word_table()[usize::from(word)]),
             Texels::Linear8(v) => v[at].map(|byte| f32::from(byte) / 255.0),
             Texels::Grey8(v) => [f32::from(v[at]) / 255.0; 3],
             Texels::Linear(v) => v[at],
@@ -145,11 +145,11 @@ impl Texture {
         // The kind of texels is matched, and the table of the sRGB curve is found, once a lookup, not once a texel.
         match self.texels.as_ref() {
             Texels::Srgb8(v) => {
-                let linear = linear_from_srgb_bytes();
+                let linear = srgb_byte_table();
                 self.bilinear(uv, |at| v[at].map(|byte| linear[usize::from(byte)]))
             }
             Texels::Srgb16(v) => {
-                let linear = linear_from_srgb_words();
+                let linear = srgb_word_table();
                 self.bilinear(uv, |at| v[at].map(|word| linear[usize::from(word)]))
             }
             Texels::Linear8(v) => self.bilinear(uv, |at| v[at].map(|byte| f32::from(byte) / 255.0)),

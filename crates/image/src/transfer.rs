@@ -15,16 +15,21 @@ pub fn linear_from_srgb(encoded: f32) -> f32 {
 static LINEAR_FROM_BYTE: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
 
-/// Linear values of sRGB bytes.
-pub fn linear_from_srgb_bytes() -> &'static [f32; 256] {
+/// The linear value of every sRGB byte, indexed by the byte.
+pub(crate) fn srgb_byte_table() -> &'static [f32; 256] {
     &LINEAR_FROM_BYTE
+}
+
+/// Linear value of an sRGB byte, from a table.
+pub fn linear_from_srgb_byte(byte: u8) -> f32 {
+    LINEAR_FROM_BYTE[usize::from(byte)]
 }
 
 static LINEAR_FROM_WORD: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|word| linear_from_srgb(f32::from(word) / 65535.0)).collect());
 
-/// Linear values of sRGB-encoded 16-bit words.
-pub(crate) fn linear_from_srgb_words() -> &'static [f32] {
+/// The linear value of every sRGB-encoded 16-bit word, indexed by the word.
+pub(crate) fn srgb_word_table() -> &'static [f32] {
     &LINEAR_FROM_WORD
 }
 
@@ -47,22 +52,22 @@ mod tests {
     fn known_values() {
         assert_eq!(byte_from_unit(srgb_from_linear(0.5)), 188);
         assert!((linear_from_srgb(0.5) - 0.214_041_14).abs() < 1e-6);
-        assert_eq!(linear_from_srgb_bytes()[255], 1.0);
+        assert_eq!(linear_from_srgb_byte(255), 1.0);
         assert_eq!(byte_from_unit(f32::NAN), 0);
     }
 
     #[test]
     fn words_are_finer_than_bytes() {
         let value = 0.893_289;
-        let word = linear_from_srgb_words()[usize::from(word_from_unit(srgb_from_linear(value)))];
-        let byte = linear_from_srgb_bytes()[usize::from(byte_from_unit(srgb_from_linear(value)))];
+        let word = srgb_word_table()[usize::from(word_from_unit(srgb_from_linear(value)))];
+        let byte = linear_from_srgb_byte(byte_from_unit(srgb_from_linear(value)));
         assert!((word - value).abs() < 2e-5 && (byte - value).abs() > 1e-3);
     }
 
     #[test]
     fn every_byte_survives() {
         for byte in 0..=255_u8 {
-            assert_eq!(byte_from_unit(srgb_from_linear(linear_from_srgb_bytes()[usize::from(byte)])), byte);
+            assert_eq!(byte_from_unit(srgb_from_linear(linear_from_srgb_byte(byte))), byte);
         }
     }
 }

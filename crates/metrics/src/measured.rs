@@ -292,7 +292,7 @@ mod tests {
         for ((width, height), of_picture, of_mask) in pinned {
             let level = |x: usize, y: usize| [(7 * x + 3 * y) % 256, (x * y) % 256, (x / 5 * 40 + y) % 256];
             // A linear value in the middle of those that become the byte.
-            let linear = |byte: usize| mateval_image::transfer::linear_from_srgb_bytes()[byte];
+            let linear = |byte: usize| mateval_image::transfer::linear_from_srgb_byte(byte as u8);
             let picture = Picture::from_fn(width, height, |x, y| LinearRgb(level(x, y).map(linear)));
             let found = maw_picture(&picture);
             assert_eq!(checksum(found.pixels().iter().flatten().map(|byte| u32::from(*byte))), of_picture);

@@ -128,7 +128,7 @@ pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Pixel
     // The point comes from the corners, not from the distance along the ray, so it is as exact as the mesh.
     let weights = hit.barycentrics.as_dvec3();
     let point = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
-    let depth = Some(camera.depth(point)).filter(|depth| *depth > 0.0)?;
+    let depth = camera.depth(point)?;
     let shading = mesh.normals.as_deref().map(|normals| {
         let [a, b, c] = mesh.triangles[triangle].map(|vertex| normals[vertex as usize].as_dvec3());
         a * weights.x + b * weights.y + c * weights.z

@@ -108,18 +108,18 @@ fn visit_around(
     let here = y * width + x;
     // The places along a row or column that stay in the picture, with their distance in steps.
     let along = |at: usize, size: usize| {
-        let [back, on] = [at / step, (size - 1 - at) / step].map(|steps| steps.min(reach));
-        (0..=back + on).map(move |place| (at + place * step - back * step, place.abs_diff(back)))
+        let [before, after] = [at / step, (size - 1 - at) / step].map(|steps| steps.min(reach));
+        (0..=before + after).map(move |k| (at + k * step - before * step, k.abs_diff(before)))
     };
-    for (row, dy) in along(y, height) {
-        for (column, dx) in along(x, width) {
+    for (row, rows) in along(y, height) {
+        for (column, columns) in along(x, width) {
             let there = row * width + column;
             if !valid[there] || instances[there] != instances[here] {
                 continue;
             }
             let cosine: f32 = (0..3).map(|c| normals[here].0[c] * normals[there].0[c]).sum();
             if there == here || cosine >= LEAST_COSINE {
-                visit(there, KERNEL[dx] * KERNEL[dy]);
+                visit(there, KERNEL[columns] * KERNEL[rows]);
             }
         }
     }

@@ -131,9 +131,10 @@ impl Camera {
         self.projection().project(world)
     }
 
-    /// The depth of a point along the camera's axis, in metres; not above 0 if it lies behind the camera.
-    pub fn depth(&self, world: DVec3) -> f64 {
-        (self.position() - world).dot(self.rotation().z_axis)
+    /// The depth of a point along the camera's axis, in metres, or `None` if it is not in front of the camera.
+    pub fn depth(&self, world: DVec3) -> Option<f64> {
+        let depth = (self.position() - world).dot(self.rotation().z_axis);
+        (depth > 0.0).then_some(depth)
     }
 
     pub fn projection(&self) -> Projection {
@@ -187,13 +188,14 @@ mod tests {
         let place = camera().unproject(pixel, 2.5);
         let (back, depth) = camera().project(place).unwrap();
         assert!((back - pixel).length() < 1e-9 && (depth - 2.5).abs() < 1e-12);
-        assert!((camera().depth(place) - 2.5).abs() < 1e-12);
+        assert!((camera().depth(place).unwrap() - 2.5).abs() < 1e-12);
     }
 
     #[test]
     fn behind_the_camera_is_nowhere() {
         let camera = camera();
-        assert!(camera.project(camera.position() + camera.rotation().z_axis).is_none());
+        let behind = camera.position() + camera.rotation().z_axis;
+        assert!(camera.project(behind).is_none() && camera.depth(behind).is_none());
     }
 
     /// +x looks up and +y looks left, as the names of the views say.

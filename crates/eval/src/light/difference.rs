@@ -103,8 +103,8 @@ pub fn corrected_quarter(
     })
 }
 
-/// f and f' of a value: the sRGB curve (IEC 61966-2-1) in double precision, clipped above 1, where its slope is 0. Below 0,
-/// which only noise is, the curve's straight part continues.
+/// f and f' of a value: the sRGB curve (IEC 61966-2-1) in double precision, clipped above 1, where its slope is 0. Values
+/// below 0, which only noise has, continue the curve's straight part.
 fn encoded_with_slope(value: f64) -> (f64, f64) {
     if value >= 1.0 {
         (1.0, 0.0)
@@ -116,7 +116,7 @@ fn encoded_with_slope(value: f64) -> (f64, f64) {
     }
 }
 
-/// f.
+/// f: at most 1.
 pub fn encoded(value: f64) -> f64 {
     encoded_with_slope(value).0
 }
@@ -129,8 +129,21 @@ pub fn difference(quarters: [&Picture<LinearRgb>; 4], guide: &ViewGuide<'_>) -> 
     let scales = [0, 1].map(|half| scale(&means[half], guide));
     let encoded_reference: Vec<[f64; 3]> =
         guide.reference.pixels().iter().map(|LinearRgb(rgb)| rgb.map(|value| encoded(f64::from(value)))).collect();
+    let (width, height) = (guide.reference.width(), guide.reference.height());
+    // X and u of a half, at a tangent whose pivot and scale come from the other half.
     let of_half = |half: usize| {
-        tangent(halves[half], &means[half], &guided[1 - half], scales[1 - half], guide, &encoded_reference)
+        let value = |at: usize, c: usize| -> [f32; 2] {
+            let of = |picture: &Picture<LinearRgb>| f64::from(picture.pixels()[at].0[c]);
+            let expected = scales[1 - half] * of(guide.ratio) * of(guide.reference);
+            let [least, most] = [expected / DIFFERENCE.pivot_factor, expected * DIFFERENCE.pivot_factor];
+            let p = of(&guided[1 - half]).clamp(least, most).clamp(0.0, 1.0);
+            let (f, slope) = encoded_with_slope(p);
+            let x = f + slope * (of(&means[half]) - p) - encoded_reference[at][c];
+            let u = slope * 0.5 * (of(halves[half][0]) - of(halves[half][1]));
+            [x as f32, u as f32]
+        };
+        let both = Picture::from_fn(width, height, |x, y| [0, 1, 2].map(|c| value(y * width + x, c)));
+        [0, 1].map(|which| both.map(|pixel| SrgbRgb(pixel.map(|value| value[which]))))
     };
     let ([first, u], [second, v]) = (of_half(0), of_half(1));
     let shown = guided_mean(means.each_ref(), guide).to_srgb();
@@ -162,28 +175,6 @@ fn scale(half: &Picture<LinearRgb>, guide: &ViewGuide<'_>) -> f64 {
     }
     let [least, most] = DIFFERENCE.scale_range;
     if of_reference > 0.0 { (of_half / of_reference).clamp(least, most) } else { 1.0 }
-}
-
-/// X and u of a half. `pivot` (g R + F) and `scale` (k) come from the other half.
-fn tangent(
-    quarters: [&Picture<LinearRgb>; 2],
-    mean: &Picture<LinearRgb>,
-    pivot: &Picture<LinearRgb>,
-    scale: f64,
-    guide: &ViewGuide<'_>,
-    encoded_reference: &[[f64; 3]],
-) -> [Picture<SrgbRgb>; 2] {
-    let DifferenceRules { pivot_factor, .. } = DIFFERENCE;
-    let value = |at: usize, c: usize| -> [f32; 2] {
-        let of = |picture: &Picture<LinearRgb>| f64::from(picture.pixels()[at].0[c]);
-        let expected = scale * of(guide.ratio) * of(guide.reference);
-        let p = of(pivot).clamp(expected / pivot_factor, expected * pivot_factor).clamp(0.0, 1.0);
-        let (f, slope) = encoded_with_slope(p);
-        let x = f + slope * (of(mean) - p) - encoded_reference[at][c];
-        [x as f32, (slope * 0.5 * (of(quarters[0]) - of(quarters[1]))) as f32]
-    };
-    let both = Picture::from_fn(mean.width(), mean.height(), |x, y| [0, 1, 2].map(|c| value(y * mean.width() + x, c)));
-    [0, 1].map(|which| both.map(|pixel| SrgbRgb(pixel.map(|value| value[which]))))
 }
 
 pub(crate) fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {

@@ -6,7 +6,7 @@ use mateval_dataset::dataset::View;
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::measured::{MeasuredFile, MeasuredRegion, color_fault};
 use mateval_dataset::{SceneId, ViewId, json};
-use mateval_image::transfer::linear_from_srgb_bytes;
+use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_metrics::measured::{RegionColors, color_difference, maw_mask, maw_picture, measurement_delta_e};
 use mateval_submission::prediction::PredictedScene;
@@ -91,8 +91,7 @@ impl SceneTask<'_> {
                 let whole = sums(regions, &pictures.base_color, |LinearRgb(rgb)| rgb.map(f64::from));
                 let whole = colors(of_view(), &whole);
                 let maw = maw_picture(&pictures.base_color);
-                let linear = linear_from_srgb_bytes();
-                let maw = sums(&small, &maw, |rgb: [u8; 3]| rgb.map(|byte| f64::from(linear[usize::from(byte)])));
+                let maw = sums(&small, &maw, |rgb: [u8; 3]| rgb.map(|byte| f64::from(linear_from_srgb_byte(byte))));
                 let maw: Vec<RegionColors> = colors(of_view(), &maw).into_iter().map(|(_, colors)| colors).collect();
                 let (values, listed) = values(&self.scene.id, view, &whole, &maw);
                 for at in (0..self.protocols.len()).filter(|at| wanted(*at)) {

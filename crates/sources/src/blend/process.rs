@@ -76,8 +76,11 @@ impl BlenderProgram {
             false => command.args(["--background", "--factory-startup", "--python"]).arg(script).arg("--").arg(job),
         };
         command.env("PYTHONDONTWRITEBYTECODE", "1");
-        // Scripts end at once and may be killed: Blender then leaves a folder behind wherever its temporary files are.
-        command.env("TMPDIR", job.parent().unwrap_or(job));
+        // Scripts end by `os._exit` or are killed, which leaves Blender's folder of temporary files. Here it is removed with
+        // the job's.
+        if let Some(folder) = std::path::absolute(job).ok().as_deref().and_then(Path::parent) {
+            command.env("TMPDIR", folder);
+        }
         command
     }
 }
@@ -239,6 +242,15 @@ pub fn write_scripts(folder: &Path) -> Result<PathBuf, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a killed Blender leaves there is removed with the job.
+    #[test]
+    fn temporary_files_lie_beside_the_job() {
+        let folder = tempfile::tempdir().unwrap();
+        let command = BlenderProgram("blender".into()).command(Path::new("render.py"), &folder.path().join("job.json"));
+        let found = command.get_envs().find(|(name, _)| *name == "TMPDIR").and_then(|(_, value)| value);
+        assert_eq!(found, Some(folder.path().as_os_str()));
+    }
 
     /// A script that is not in the list would be missing when Blender runs.
     #[test]
