@@ -551,8 +551,10 @@ mod tests {
         let places = Places::of(folder.path());
         let options = |lpips, samples| Options {
             tool: TOOL.to_owned(),
+            scorer_version: SCORER_VERSION,
             renderer: RendererKind::Builtin,
             samples,
+            reference_samples: 4 * samples,
             resolution: SMALL,
             baselines: vec![DemoBaseline::Grey],
             lpips,
