@@ -9,7 +9,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::transfer::{srgb_byte_table, srgb_word_table};
+use crate::transfer::{linear_from_srgb_byte, srgb_byte_table, srgb_word_table};
 
 /// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +121,7 @@ impl Texture {
     pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
         let at = y * self.width + x;
         match self.texels.as_ref() {
-            Texels::Srgb8(v) => v[at].map(|byte| srgb_byte_table()[usize::from(byte)]),
+            Texels::Srgb8(v) => v[at].map(linear_from_srgb_byte),
             Texels::Srgb16(v) => v[at].map(|word| srgb_word_table()[usize::from(word)]),
             Texels::Linear8(v) => v[at].map(|byte| f32::from(byte) / 255.0),
             Texels::Grey8(v) => [f32::from(v[at]) / 255.0; 3],

@@ -7,6 +7,15 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
 }
 
+/// [`srgb_from_linear`] in double precision, with the slope of the curve there.
+pub fn srgb_with_slope(linear: f64) -> (f64, f64) {
+    if linear <= 0.003_130_8 {
+        return (12.92 * linear, 12.92);
+    }
+    let scaled = 1.055 * libm::pow(linear, 1.0 / 2.4);
+    (scaled - 0.055, scaled / (2.4 * linear))
+}
+
 /// The linear value of an sRGB-encoded one, the inverse of [`srgb_from_linear`].
 pub fn linear_from_srgb(encoded: f32) -> f32 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { libm::powf((encoded + 0.055) / 1.055, 2.4) }
@@ -54,6 +63,16 @@ mod tests {
         assert!((linear_from_srgb(0.5) - 0.214_041_14).abs() < 1e-6);
         assert_eq!(linear_from_srgb_byte(255), 1.0);
         assert_eq!(byte_from_unit(f32::NAN), 0);
+    }
+
+    #[test]
+    fn the_slope_is_that_of_the_curve() {
+        for linear in [-0.5, 0.002, 0.004, 0.2, 0.9] {
+            let (encoded, slope) = srgb_with_slope(linear);
+            let difference = srgb_with_slope(linear + 1e-6).0 - srgb_with_slope(linear - 1e-6).0;
+            assert!((encoded - f64::from(srgb_from_linear(linear as f32))).abs() < 1e-6, "{linear}");
+            assert!((slope - difference / 2e-6).abs() < 1e-6 * slope, "{linear}");
+        }
     }
 
     #[test]

@@ -24,6 +24,7 @@
 //! is the mean of t. For the true maps q = t and r = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of
 //! paths.
 
+use mateval_image::transfer::srgb_with_slope;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_tracer::noise_filter::{Surfaces, filtered_mean};
 use schemars::JsonSchema;
@@ -103,17 +104,9 @@ pub fn corrected_quarter(
     })
 }
 
-/// f and f' of a value: the sRGB curve (IEC 61966-2-1) in double precision, clipped above 1, where its slope is 0. Values
-/// below 0, which only noise has, continue the curve's straight part.
+/// f and f' of a value. Values below 0, which only noise has, continue the curve's straight part.
 fn encoded_with_slope(value: f64) -> (f64, f64) {
-    if value >= 1.0 {
-        (1.0, 0.0)
-    } else if value <= 0.0031308 {
-        (12.92 * value, 12.92)
-    } else {
-        let scaled = 1.055 * libm::pow(value, 1.0 / 2.4);
-        (scaled - 0.055, scaled / (2.4 * value))
-    }
+    if value >= 1.0 { (1.0, 0.0) } else { srgb_with_slope(value) }
 }
 
 /// f: at most 1.

@@ -76,8 +76,8 @@ impl BlenderProgram {
             false => command.args(["--background", "--factory-startup", "--python"]).arg(script).arg("--").arg(job),
         };
         command.env("PYTHONDONTWRITEBYTECODE", "1");
-        // Scripts end by `os._exit` or are killed, which leaves Blender's folder of temporary files. Here it is removed with
-        // the job's.
+        // Scripts end by `os._exit` or are killed, which leaves Blender's folder of temporary files behind. Here it goes
+        // with the job's.
         if let Some(folder) = std::path::absolute(job).ok().as_deref().and_then(Path::parent) {
             command.env("TMPDIR", folder);
         }
