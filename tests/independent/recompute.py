@@ -84,8 +84,19 @@ def colour_difference(prediction, truth, mask):
 LINEAR_METRICS = {"delta_e": colour_difference}
 
 
+def flip(prediction, reference, mask):
+    """The mean FLIP; pixels outside the mask are the reference's."""
+    filled = np.where(mask[..., None], prediction, reference)
+    pair = [np.ascontiguousarray(picture, dtype=np.float32) for picture in (reference, filled)]
+    return float(np.asarray(flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)[0]).squeeze()[mask].mean())
+
+
+#: Further metrics of encoded pictures, over the valid pixels of a view, and the kinds of pictures that have them.
+ENCODED_METRICS = {"flip": (("rgb_true",), flip)}
+
+
 class Similarity:
-    """SSIM, LPIPS and FLIP of two encoded pictures over a mask."""
+    """The metrics of two encoded pictures over a mask."""
 
     def __init__(self, weights):
         self.lpips = None
@@ -109,7 +120,7 @@ class Similarity:
                 own[name] = state[f"lin{k}.weight"].reshape(own[name].shape)
         self.lpips.load_state_dict(own)
 
-    def values(self, prediction, reference, mask, with_flip):
+    def values(self, kind, prediction, reference, mask):
         found = {}
         whole = whole_windows(mask)
         if whole.any():
@@ -119,10 +130,8 @@ class Similarity:
             tensor = lambda picture: self.torch.tensor(picture.transpose(2, 0, 1)[None] * 2 - 1, dtype=self.torch.float32)
             with self.torch.no_grad():
                 found["lpips_alex"] = float(self.lpips(tensor(filled), tensor(reference))[0, 0].numpy()[mask].mean())
-        if with_flip:
-            pair = [np.ascontiguousarray(picture, dtype=np.float32) for picture in (reference, filled)]
-            found["flip"] = float(np.asarray(flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)[0]).squeeze()[mask].mean())
-        return found
+        of_kind = {name: value for name, (kinds, value) in ENCODED_METRICS.items() if kind in kinds}
+        return found | {name: value(prediction, reference, mask) for name, value in of_kind.items()}
 
 
 def blocks(camera, first, shape):
@@ -216,7 +225,7 @@ def scene_means(dataset, pictures, scene, similarity):
                 values[kind, views, "mse"].append(mse)
                 values[kind, views, "psnr"].append(psnr(mse))
             clipped = [np.clip(a, 0, 1) for a in (picture, truth)]
-            for metric, value in similarity.values(*map(encoded, clipped), valid, False).items():
+            for metric, value in similarity.values(kind, *map(encoded, clipped), valid).items():
                 values[kind, whole, metric].append(value)
             for metric, value in LINEAR_METRICS.items():
                 values[kind, whole, metric].append(value(picture, truth, valid))
@@ -233,7 +242,7 @@ def scene_means(dataset, pictures, scene, similarity):
                 values[f"{kind}_specular", whole, "mae"].append(np.abs(off)[specular].mean())
         ids = blocks(view["camera"], first, valid.shape)
         for folder in sorted(path for path in made.iterdir() if path.is_dir()):
-            kind = "rgb_true" if folder.name == "true" else "rgb_relit"
+            kind = folder.name.partition("-")[0]
             x, u, prediction, reference = light(folder, valid)
             for views, mask in regions + ([(whole, specular)] if kind == "rgb_true" else []):
                 if not mask.any():
@@ -243,7 +252,7 @@ def scene_means(dataset, pictures, scene, similarity):
                 values[picture, views, "mse"].append(error.mse)
                 values[picture, views, "psnr"].append(psnr(error.bounded()))
                 noise[f"{picture}.{views}.psnr"].append(error)
-            for metric, value in similarity.values(prediction, reference, valid, kind == "rgb_true").items():
+            for metric, value in similarity.values(kind, prediction, reference, valid).items():
                 values[kind, whole, metric].append(value)
     texels = collections.defaultdict(lambda: [0.0, 0.0])
     for path in sorted((pictures / scene / "texels").glob("*.exr")):

@@ -7,7 +7,7 @@ use std::time::Duration;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{Camera, SceneId, ViewId};
 use mateval_image::{LinearRgb, Picture};
-use mateval_prep::blender::{
+use mateval_prep::blender_job::{
     BlenderEvent, BlenderLimits, BlenderProgram, DeviceChoice, JobFolder, JobPlan, JobView, tail,
 };
 

@@ -21,7 +21,7 @@ use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use mateval_image::{LinearRgb, Picture};
 
-use mateval_testkit::statistics::chi_square_z;
+use mateval_testkit::statistics::{Estimate, chi_square_z};
 
 /// A test with a p-value below this fails.
 pub const FALSE_ALARM: f64 = 1e-5;
@@ -108,20 +108,20 @@ fn compare_channel(ours: &Side, theirs: &Side) -> Agreement {
             worst_pixel = worst_pixel.max(difference[k].abs() / variance[k].max(common).sqrt());
         }
     }
-    let (pixel_mean, pixel_error) = mean_and_error(&squares);
+    let pixel = Estimate::of(&squares);
     let tile_mean = tile_z.iter().map(|z| z * z).sum::<f64>() / tile_z.len() as f64;
     let worst_tile = tile_z.iter().fold(0.0_f64, |worst, z| worst.max(z.abs()));
     let tests = [
         ("whole", two_sided(whole_z)),
         ("tiles", upper(chi_square_z(tile_mean, tile_z.len() as f64))),
         ("worst tile", tile_z.len() as f64 * two_sided(worst_tile)),
-        ("pixels", upper((pixel_mean - 1.0) / pixel_error)),
+        ("pixels", upper(pixel.z(1.0))),
         ("worst pixel", squares.len() as f64 * student(worst_pixel, (ours.renders - 1) as f64)),
     ];
     let (test, p) = tests.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
     let [a, b] = [ours, theirs].map(|side| side.mean.iter().sum::<f64>());
     let error = variance.iter().sum::<f64>().sqrt() / b;
-    Agreement { ratio: a / b, error, whole_z, tile_mean, worst_tile, pixel_mean, worst_pixel, p, test }
+    Agreement { ratio: a / b, error, whole_z, tile_mean, worst_tile, pixel_mean: pixel.mean, worst_pixel, p, test }
 }
 
 /// The pixels of each tile; those at the right and lower edge may be smaller.
@@ -131,13 +131,6 @@ fn tiles(width: usize, height: usize) -> Vec<Vec<usize>> {
         rows.flat_map(|y| (x0..(x0 + TILE).min(width)).map(move |x| y * width + x)).collect()
     };
     (0..height).step_by(TILE).flat_map(|y| (0..width).step_by(TILE).map(move |x| tile(x, y))).collect()
-}
-
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt().max(1e-12))
 }
 
 /// The probability that a standard normal lies further from 0.

@@ -40,7 +40,7 @@ impl Rooms {
             run(build(&recipe, &folder.join(dataset)).arg("--source").arg(source)).ends_with(0);
             copy_folder(&folder.join(dataset), &folder.join(format!("{dataset}_scored")));
             let mut render = mateval();
-            run(render.args(["prep", "render", "--only", "photo", "--samples", "64"]).arg(folder.join(dataset)))
+            run(render.args(["prep", "render", "--only", "photo", "--samples", "16"]).arg(folder.join(dataset)))
                 .ends_with(0);
         }
         let mut publish = mateval();

@@ -171,7 +171,7 @@ fn a_hanging_growing_or_crashing_blender_is_ended_and_reported() {
     assert_eq!(files_below(&renders(copy.path())), [""; 0].map(PathBuf::from));
 }
 
-/// A scene that fails is tried again and does not affect the others.
+/// A scene that fails is tried again and does not affect the others, which are rendered at the same time.
 #[test]
 fn attempts_are_counted_and_other_scenes_are_rendered() {
     let Some((python, _turn)) = blender() else { return };
@@ -180,9 +180,14 @@ fn attempts_are_counted_and_other_scenes_are_rendered() {
     let dataset = folder.path().join("dataset");
     run(&mut build(&recipe, &dataset)).ends_with(0);
     let real = format!("exec '{}' -I -B \"$JOB/scripts/render.py\" \"$JOB/job.json\"", python.display());
-    let body = format!("case \"$JOB\" in */one) exit 3;; esac\n{real}");
+    // Scenes are rendered at once: the first ends with 4 unless the second begins meanwhile.
+    let body = format!(
+        "case \"$JOB\" in */one) tries=0; until [ -e '{0}/two' ]; do [ $tries -lt 300 ] || exit 4; tries=$((tries + 1)); \
+         sleep 0.1; done; exit 3;; esac\ntouch '{0}/two'\n{real}",
+        folder.path().display()
+    );
     let failed = run(by_blender(&dataset, &stand_in(folder.path(), &body), &[]).args(["--jobs", "2"]));
-    fails(failed, &["'scenes/one'", "1 scene could not be rendered"]).says("attempt 1 failed");
+    fails(failed, &["'scenes/one'", "exit status: 3", "1 scene could not be rendered"]).says("attempt 1 failed");
     assert!(dataset.join("scenes/two/ground_truth/renders/blender/input/render.json").is_file());
     // The first attempt fails, the second does not.
     let body = format!("[ -f '{0}/tried' ] || {{ touch '{0}/tried'; exit 3; }}\n{real}", folder.path().display());

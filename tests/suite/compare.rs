@@ -9,6 +9,7 @@ use std::sync::{Arc, LazyLock};
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::material::{ColorInput, MaterialModel};
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::render_file::RenderFile;
 use mateval_dataset::render_file::RenderNoise;
@@ -391,8 +392,7 @@ fn a_moved_piece_is_found() {
     ids.pixels().iter().filter(|id| **id > 0).for_each(|id| *counts.entry(*id).or_insert(0) += 1);
     let is_piece = |id: u16| {
         let mesh = &scene.surfaces[usize::from(id) - 1].mesh;
-        let low = mesh.positions.iter().copied().reduce(glam::Vec3::min).unwrap();
-        let high = mesh.positions.iter().copied().reduce(glam::Vec3::max).unwrap();
+        let [low, high] = bounds(mesh.positions.iter().copied()).unwrap();
         (high - low).max_element() < 2.0
     };
     let (piece, pixels) = counts.into_iter().filter(|(id, _)| is_piece(*id)).max_by_key(|(_, count)| *count).unwrap();

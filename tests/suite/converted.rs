@@ -1,5 +1,5 @@
 //! Converted materials: nothing about a surface is hidden from the three maps, `materials = "source"` keeps the source's
-//! own, the comparison measures the difference, and parameters that a source does not state have no scores.
+//! own, and parameters that a source does not state have no scores.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +11,9 @@ use mateval_dataset::{SceneId, glb, reference};
 use mateval_eval::truth::true_material;
 use mateval_image::{LinearRgb, Picture};
 use mateval_prep::conversion::is_scored_model;
-use mateval_tracer::{Coat, Lighting, RenderSettings, Repaint, Scattering, World, render_repainted, render_views};
+use mateval_tracer::{
+    Lighting, RenderSettings, Repaint, Scattering, SurfaceMaps, World, render_repainted, render_views,
+};
 use serde_json::Value;
 
 use super::blender::blender;
@@ -53,14 +55,14 @@ fn the_maps_describe_a_surface_completely() {
     assert!(materials.iter().filter(|material| material.has_appearance()).count() >= 8);
 
     let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
-    let coat = |instance: &mateval_dataset::dataset::Instance| {
+    let maps = |instance: &mateval_dataset::dataset::Instance| {
         let size = instance.atlas.as_ref()?.size as usize;
         let truth = true_material(&folder, &instance.id, size).unwrap();
         let scattering = Scattering { roughness: truth.roughness, metallic: truth.metallic };
-        Some(Coat { base_colors: vec![truth.base_color], scattering })
+        Some(SurfaceMaps { base_colors: vec![truth.base_color], scattering })
     };
-    let coats = scene.instances.iter().map(coat).collect();
-    let repaint = Repaint::new(&world, &atlases, coats, PrincipledFlavour::Blender).unwrap();
+    let maps = scene.instances.iter().map(maps).collect();
+    let repaint = Repaint::new(&world, &atlases, maps, PrincipledFlavour::Blender).unwrap();
     let settings = RenderSettings { samples: 16, ..Default::default() };
     let (cameras, seeds) = ([scene.views[0].camera], [5]);
     let none = |_: usize, _: usize| ();
@@ -158,16 +160,6 @@ fn a_metal_without_a_real_index_renders() {
         let is_plastic = |line: &Value| line.as_str().unwrap().contains("plastic is Principled");
         assert_eq!(record["approximations"].as_array().unwrap().iter().any(is_plastic), materials == "source");
         run(&mut render(&dataset, 1)).ends_with(0);
-
-        // The comparison measures how far the converted materials are from the source's own.
-        let compared = run(mateval().args(["prep", "compare", "--samples", "16", "--format", "json"]).arg(&dataset));
-        let compared: Value = serde_json::from_str(&compared.stdout).unwrap();
-        let measured = &compared["scenes"][0]["source_materials"];
-        assert_eq!(measured.is_null(), materials == "source");
-        if materials == "converted" {
-            let [ours, theirs] = [0, 1].map(|at| measured["light"]["means"][at][1].as_f64().unwrap());
-            assert!(measured["view"] == "input" && ours != theirs && (theirs / ours - 1.0).abs() < 0.1, "{measured}");
-        }
     }
 }
 

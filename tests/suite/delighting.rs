@@ -6,8 +6,7 @@ use std::sync::LazyLock;
 
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_metrics::alignment::{channel_scales, scaled};
-use mateval_metrics::{Psnr, mse};
+use mateval_metrics::{Psnr, channel_scales, mse, scaled};
 use mateval_testkit::kept_folder;
 
 use super::command::{Run, baseline, build, render_photos, run};

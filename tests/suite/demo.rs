@@ -35,6 +35,13 @@ fn it_says_what_it_made_resumes_and_refuses_other_folders() {
     let table = first.stdout.split("The leaderboard").next().unwrap();
     assert!(table.lines().all(|line| line.chars().count() <= 80) && table.contains("gt"), "{table}");
 
+    // The board has the light that the score compared, which is the truth's.
+    let picture = |method: &str, kind: &str| {
+        std::fs::read(out.join("leaderboard/pictures").join(method).join("room/input").join(kind)).unwrap()
+    };
+    assert_eq!(picture("gt", "rgb_true.png"), picture("_truth", "rgb_true.png"));
+    assert_ne!(picture("gt", "rgb_true.png"), picture("gt", "rgb_true-error.png"));
+
     // As after an interruption: only missing files are made again, with the same bytes. The truth's result takes a
     // moment, since no path is traced for it.
     let result = out.join("results/gt.json");

@@ -21,7 +21,7 @@ fn a_second_build_and_render_give_the_same_manifest() {
     assert!(built > 100 && manifest(&dataset).lines().count() > built);
 }
 
-/// `prep/src/atlas/cache.rs` tests what becomes of damaged ones.
+/// `prep/src/atlas/mod.rs` tests what becomes of damaged ones.
 #[test]
 fn a_build_from_kept_atlases_is_the_same() {
     let folder = tempfile::tempdir().unwrap();

@@ -126,14 +126,14 @@ fn the_page_shows_every_candidate_and_every_rejection() {
 }
 
 #[test]
-fn a_list_rejects_with_its_reason_and_a_survey_is_reproducible_to_the_byte() {
+fn a_rule_rejects_with_its_reason_and_a_survey_is_reproducible_to_the_byte() {
     let folder = tempfile::tempdir().unwrap();
-    let (list, out) = (folder.path().join("bad.csv"), folder.path().join("survey"));
-    std::fs::write(&list, "MasterBedroom-102,the bed is made\n").unwrap();
-    run(survey_of(&SURVEYED.source, &out).arg("--list").arg(&list)).ends_with(0);
-    let listed = json(&out.join("survey.json"))["houses"][0]["rooms"][1].clone();
-    assert_eq!(listed["rejections"][0]["rule"], "listed");
-    assert!(listed["rejections"][0]["reason"].as_str().unwrap().contains("the bed is made"), "{listed}");
+    let [rules, out] = ["rules.toml", "survey"].map(|name| folder.path().join(name));
+    std::fs::write(&rules, "room_types = [\"LivingDiningRoom\"]\n").unwrap();
+    run(survey_of(&SURVEYED.source, &out).arg("--rules").arg(&rules)).ends_with(0);
+    let bedroom = json(&out.join("survey.json"))["houses"][0]["rooms"][1].clone();
+    assert_eq!(bedroom["rejections"][0]["rule"], "room_types");
+    assert!(bedroom["rejections"][0]["reason"].as_str().unwrap().contains("'MasterBedroom'"), "{bedroom}");
     run(&mut survey_of(&SURVEYED.source, &out)).ends_with(2).says("--force");
     // What else lies there stays.
     let notes = ["notes.txt", "thumbnails/notes.txt"].map(|name| out.join(name));

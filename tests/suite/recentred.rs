@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
-use glam::{Vec3, vec3};
+use glam::vec3;
 use mateval_dataset::TriangleMesh;
+use mateval_dataset::mesh::bounds;
 use serde_json::{Value, json};
 
 use super::importing::{import, nodes, srgb, write_gltf, write_meshes};
@@ -12,8 +13,7 @@ use super::sample::json as read_json;
 
 /// The mesh as TRELLIS.2 returns it: the middle of its box at the origin, the longest side 0.99999; then Z up.
 fn recentred(mesh: &TriangleMesh) -> TriangleMesh {
-    let low = mesh.positions.iter().copied().reduce(Vec3::min).unwrap();
-    let high = mesh.positions.iter().copied().reduce(Vec3::max).unwrap();
+    let [low, high] = bounds(mesh.positions.iter().copied()).unwrap();
     let scale = 0.99999 / (high - low).max_element();
     let places = mesh.positions.iter().map(|place| (*place - (low + high) / 2.0) * scale);
     TriangleMesh { positions: places.map(|p| vec3(p.x, -p.z, p.y)).collect(), ..mesh.clone() }

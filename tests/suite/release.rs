@@ -50,12 +50,12 @@ fn verdict(dataset: &Path, state: &str) -> Value {
         ids.enumerate().map(|(at, id)| json!({"view": id, "checks": [check(state_of(at))], "light": []})).collect();
     let file = json(&dataset.join("dataset.json"));
     json!({
-        "format": "mateval-compare/3", "tool": "mateval 9.8.7",
+        "format": "mateval-compare/4", "tool": "mateval 9.8.7",
         "dataset": {"name": file["name"], "version": file["version"], "manifest_sha256": file["manifest_sha256"]},
         "renderer": "blender", "bounds": mateval_prep::compare::file::BOUNDS,
         "agrees": state != "differs", "undecided": usize::from(state == "too_noisy"),
         "scenes": [{"scene": "room", "kinds": ["lambert"], "tile_bound": 0.01, "passes": [4],
-            "seeds": ["0000000000000001", "0000000000000002"], "source_materials": null, "views": views}],
+            "seeds": ["0000000000000001", "0000000000000002"], "views": views}],
     })
 }
 
@@ -186,7 +186,7 @@ fn files_that_do_not_fit_are_refused_together() {
     write_verdict(&verdicts, "e_contradicts", &change("/agrees", json!(false)));
     write_verdict(&verdicts, "f_partial", &change("/scenes/0/views/1/view", json!("elsewhere")));
     write_json(&verdicts.join("g_other.json"), &json!({"format": "mateval-lint/1"}));
-    write_json(&verdicts.join("h_bad.json"), &json!({"format": "mateval-compare/3", "agrees": "yes"}));
+    write_json(&verdicts.join("h_bad.json"), &json!({"format": "mateval-compare/4", "agrees": "yes"}));
     // Results of another dataset, and one that was changed.
     let [ceiling, floor] = RESULTS.each_ref().map(|path| json(path));
     let mut changed = floor;

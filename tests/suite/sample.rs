@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use super::command::{build, render, run, run_words};
+pub use mateval_testkit::files_below;
 use mateval_testkit::{copy_folder, kept_folder};
 
 /// 96x72 pixels and atlases of 128 texels: all five views are built and rendered within seconds.
@@ -78,24 +79,6 @@ pub fn copy_source(source: &Path) {
 pub fn recipe_text(head: &str, ids: &[&str]) -> String {
     let scene = |id: &&str| format!("\n[[scene]]\nid = \"{id}\"\nbitterli = \"room/scene.xml\"\nhouse = \"sample\"\n");
     format!("name = \"sample\"\n{head}\n{}", ids.iter().map(scene).collect::<String>())
-}
-
-/// Every file below `root`, relative, sorted.
-pub fn files_below(root: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    let mut folders = vec![root.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).into_iter().flatten() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                files.push(path.strip_prefix(root).unwrap().to_owned());
-            }
-        }
-    }
-    files.sort();
-    files
 }
 
 /// MANIFEST.sha256 as text.

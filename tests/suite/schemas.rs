@@ -14,7 +14,7 @@ use mateval_dataset::submission::SubmissionFile;
 use mateval_dataset::verdict::VerdictFile;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
-use mateval_prep::blender::{BlenderJob, BlenderResult};
+use mateval_prep::blender_job::{BlenderJob, BlenderResult};
 use mateval_prep::compare::file::CompareFile;
 use mateval_prep::stats::StatsFile;
 use mateval_prep::stats::findings::FindingsFile;

@@ -9,7 +9,7 @@ use mateval_files::lease::Lease;
 use serde_json::{Value, json};
 
 use super::command::{Run, mateval, run};
-use super::sample::json as read_json;
+use super::sample::{files_below, json as read_json};
 use mateval_testkit::{copy_folder, kept_folder};
 
 /// Houses in the source beside the built-in one.
@@ -53,21 +53,8 @@ fn houses(source: &Path) -> Vec<String> {
 
 /// Every file that a survey offers, with its bytes. What `.survey` holds is for resuming alone.
 fn files(survey: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![survey.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            match path.is_dir() {
-                true if path.ends_with(".survey") => {}
-                true => folders.push(path),
-                false => {
-                    found.insert(path.strip_prefix(survey).unwrap().to_owned(), std::fs::read(&path).unwrap());
-                }
-            }
-        }
-    }
-    found
+    let offered = files_below(survey).into_iter().filter(|file| !file.starts_with(".survey"));
+    offered.map(|file| (file.clone(), std::fs::read(survey.join(file)).unwrap())).collect()
 }
 
 #[track_caller]

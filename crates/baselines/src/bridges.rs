@@ -17,10 +17,9 @@ use glam::{DVec2, DVec3};
 use mateval_dataset::dataset::Instance;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, Report, SceneId, TriangleMesh};
-use mateval_files::FileError;
 use mateval_files::untrusted::read_at_most;
 use mateval_files::whole::write_whole;
-use mateval_files::work_folder::WorkFolder;
+use mateval_files::work_folder::{WorkFolder, make_folder};
 use mateval_image::exr_io::{Precision, write_linear};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texture, Wrap, npy_io, png_io};
@@ -99,7 +98,7 @@ pub fn export_texgen(
             }
             let id = object_id(&scene.id, instance);
             let folder = work.path().join(object_folder(&id));
-            std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+            make_folder(&folder)?;
             write_object(&folder, geometry.mesh(at), &known)?;
             png_io::write_rgb_bytes(&folder.join("picture.png"), &picture(&seen, &estimate, at))?;
             let prompt = instance.category.as_deref().unwrap_or(&instance.name);
@@ -254,7 +253,7 @@ pub fn import_partfield(dataset: &Dataset, clusters: &Path, parts: u8, out: &Pat
     let mut count = 0;
     for scene in &dataset.scenes {
         let folder = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+        make_folder(&folder)?;
         for instance in &scene.instances {
             let Some(path) = labels_of(clusters, &scene.id, instance, parts) else { continue };
             let bytes = checked_labels(&path, instance)?;

@@ -127,18 +127,14 @@ mod tests {
     use glam::Vec3;
     use mateval_dataset::uv_atlas::UvAtlas;
     use mateval_image::Picture;
+    use mateval_testkit::scenes::quad;
 
     use super::FillRule;
     use super::*;
 
     /// A wall of 2 m x 2 m along an axis; its uv are the unit square.
     fn wall() -> TriangleMesh {
-        TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 2.0, 0.0), Vec3::Y * 2.0],
-            normals: None,
-            uvs: Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(glam::Vec2::from).into()),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        }
+        quad(Vec3::ZERO, Vec3::X * 2.0, Vec3::Y * 2.0)
     }
 
     /// The left third is seen; the values of a texel are its column and row.

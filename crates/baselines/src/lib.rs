@@ -5,8 +5,11 @@
 //!
 //! Baselines: [`bounds`] are the ceiling for atlases of this size and the floor; [`nn`] lifts the estimate to the
 //! atlases; [`median`] takes medians of it; [`procedural`] fits graphs to it; [`import`] transfers meshes that have their
-//! own uv. [`bridges`]: with TEXGen another project's network fills unseen texels, with PartField one splits instances
-//! into parts.
+//! own uv. [`delight`] makes an estimate by taking the light out of the photo. [`bridges`]: with TEXGen another
+//! project's network fills unseen texels, with PartField one splits instances into parts.
+//!
+//! [`encoding_report`] compares the numbers that a method stored with the truth and reports which encoding they fit, by
+//! [`encoding_fit`].
 //!
 //! Steps: [`geometry`] reads the scene as methods see it and determines which instance each pixel shows; [`lift`]
 //! writes the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
 use mateval_dataset::uv_atlas::UvAtlas;
-use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, png_io};
 
@@ -76,7 +76,7 @@ impl Maps {
 
     /// Writes the maps to the instance's folder, which is created.
     pub fn write(&self, folder: &Path) -> Result<(), BaselineError> {
-        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+        make_folder(folder)?;
         let path = |map: Map| folder.join(map.stem()).with_extension("png");
         if let Some(picture) = &self.base_color {
             png_io::write_rgb_bytes(&path(Map::BaseColor), picture)?;
@@ -112,8 +112,14 @@ impl Medians {
             }
         }
         Self {
-            of_instance: of_instance.into_iter().map(|(instance, mut all)| (instance, median(&mut all))).collect(),
-            of_category: of_category.into_iter().map(|(category, mut all)| (category, median(&mut all))).collect(),
+            of_instance: of_instance
+                .into_iter()
+                .map(|(instance, mut all)| (instance, lower_median(&mut all)))
+                .collect(),
+            of_category: of_category
+                .into_iter()
+                .map(|(category, mut all)| (category, lower_median(&mut all)))
+                .collect(),
         }
     }
 
@@ -128,7 +134,7 @@ impl Medians {
 }
 
 /// The median of each value; of an even number of entries the lower of the middle two.
-pub fn median(all: &mut [Values]) -> Values {
+pub fn lower_median(all: &mut [Values]) -> Values {
     if all.is_empty() {
         return DEFAULT;
     }
@@ -173,8 +179,8 @@ mod tests {
     #[test]
     fn each_value_has_its_own_median() {
         let mut all = [[3.0, 0.0, 9.0, 0.1, 1.0], [1.0, 5.0, 7.0, 0.2, 0.0], [2.0, 4.0, 8.0, 0.3, 0.0]];
-        assert_eq!(median(&mut all), [2.0, 4.0, 8.0, 0.2, 0.0]);
-        assert_eq!(median(&mut all[..2])[0], median(&mut [all[0], all[1]])[0]);
-        assert_eq!(median(&mut []), DEFAULT);
+        assert_eq!(lower_median(&mut all), [2.0, 4.0, 8.0, 0.2, 0.0]);
+        assert_eq!(lower_median(&mut all[..2])[0], lower_median(&mut [all[0], all[1]])[0]);
+        assert_eq!(lower_median(&mut []), DEFAULT);
     }
 }

@@ -12,7 +12,7 @@ use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
 use crate::estimate_source::EstimateSource;
 use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels};
-use crate::maps::{Maps, Medians, PartColors, median};
+use crate::maps::{Maps, Medians, PartColors, lower_median};
 use crate::nn::seen_pixels;
 use crate::submission::{Method, write_scenes};
 
@@ -101,6 +101,6 @@ fn colors_of_parts<'a>(
     }
     Ok(PartColors::new(triangles, |part, instance| {
         let pixels = &mut pixels[part];
-        Some(if pixels.is_empty() { medians.of(geometry, instance) } else { median(pixels) })
+        Some(if pixels.is_empty() { medians.of(geometry, instance) } else { lower_median(pixels) })
     }))
 }

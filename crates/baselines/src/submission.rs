@@ -8,8 +8,7 @@ use mateval_dataset::layout::is_rendered;
 use mateval_dataset::open::{Dataset, check_outside};
 use mateval_dataset::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, StoredEncoding, SubmissionFile, scene_folder};
 use mateval_dataset::{Progress, Report, json};
-use mateval_files::FileError;
-use mateval_files::work_folder::{WorkFolder, check_free};
+use mateval_files::work_folder::{WorkFolder, check_free, make_folder};
 
 use crate::error::BaselineError;
 
@@ -56,7 +55,7 @@ pub fn write(
         let mut instances = 0;
         for instance in scene.instances.iter().filter(|instance| instance.atlas.is_some()) {
             let folder = folder.join(instance.id.as_str());
-            std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+            make_folder(&folder)?;
             write_instance(scene, instance, &folder)?;
             instances += 1;
         }
@@ -85,7 +84,7 @@ pub fn write_scenes(
         let concerns = |path: &str| !is_rendered(path) && (has_truth || !path.starts_with("ground_truth/"));
         dataset.check_files(&scene.id, concerns)?;
         let folder = scene_folder(work.path(), &scene.id);
-        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+        make_folder(&folder)?;
         instances += write_scene(scene, &folder)?;
     }
     let file = SubmissionFile {

@@ -16,12 +16,13 @@ use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::median::{self, MedianOf};
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::procedural::{self, ProceduralOptions};
+use mateval_dataset::json;
 use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::progress::wrapped;
-use mateval_dataset::{Finding, Severity, json};
 use mateval_eval::light::reference::{ReferenceOptions, make_references};
-use mateval_eval::protocol::{Protocol, SCORER_VERSION, Track};
+use mateval_eval::protocol::{Protocol, SCORER_VERSION};
 use mateval_eval::result::ResultFile;
+use mateval_eval::scene::SeenLight;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_files::work_folder;
 use mateval_metrics::Net;
@@ -30,18 +31,16 @@ use mateval_prep::build::{BuildOptions, build};
 use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
 use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::marks::TrustedKeys;
-use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
+use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries, keep_seen};
 use mateval_report::strips::Shown;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables};
+use mateval_submission::files::SubmissionJson;
 use serde::{Deserialize, Serialize};
 
 use crate::TOOL;
 use crate::fetch::{cache_folder, load_weights};
 use crate::prep::make::{BlenderArgs, checked_renderer, renderer_parser, samples_parser};
-use crate::terminal::{Outcome, columns, counted, error_text, print, say, with_progress};
-
-/// The protocol whose numbers are printed.
-const PROTOCOL: &str = "mateval-3";
+use crate::terminal::{Outcome, columns, counted, error_text, print, say, say_warnings, with_progress};
 
 /// A baseline of the demo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
@@ -124,7 +123,7 @@ struct Options {
 }
 
 /// The folders and files in a demo's folder.
-struct Places {
+struct DemoFolder {
     out: PathBuf,
     options: PathBuf,
     source: PathBuf,
@@ -132,11 +131,11 @@ struct Places {
     submissions: PathBuf,
     delit: PathBuf,
     results: PathBuf,
-    scores: PathBuf,
+    pictures: PathBuf,
     leaderboard: PathBuf,
 }
 
-impl Places {
+impl DemoFolder {
     fn of(out: &Path) -> Self {
         let place = |name| out.join(name);
         Self {
@@ -147,7 +146,7 @@ impl Places {
             submissions: place("submissions"),
             delit: place("delit"),
             results: place("results"),
-            scores: place("results.scenes"),
+            pictures: place("pictures"),
             leaderboard: place("leaderboard"),
         }
     }
@@ -164,9 +163,9 @@ impl Places {
 impl DemoArgs {
     /// Runs the steps one after the other and prints the results.
     pub fn run(&self) -> anyhow::Result<Outcome> {
-        let places = Places::of(&self.out);
+        let demo = DemoFolder::of(&self.out);
         let lpips = load_weights(Net::Alex);
-        let earlier = earlier_options(&places)?;
+        let earlier = earlier_options(&demo)?;
         let (kind, renderer) = choose_renderer(self, earlier.as_ref())?;
         let samples = self.samples.unwrap_or(if self.full { 64 } else { 8 });
         let options = Options {
@@ -179,20 +178,20 @@ impl DemoArgs {
             baselines: self.baselines(),
             lpips: matches!(lpips, LpipsWeights::Loaded(_)),
         };
-        begin(&places, earlier.as_ref(), &options, self.force)?;
-        json::write(&places.options, &options).context("cannot begin the demo")?;
+        begin(&demo, earlier.as_ref(), &options, self.force)?;
+        json::write(&demo.options, &options).context("cannot begin the demo")?;
 
         step(1, "sample", || {
-            mateval_sample::write_at(&places.source, options.resolution).context("cannot write the sample")?;
+            mateval_sample::write_at(&demo.source, options.resolution).context("cannot write the sample")?;
             Ok("2 source scenes, a house and a room, and their recipe".to_owned())
         })?;
-        step(2, "prep build", || build_dataset(&places))?;
-        step(3, "prep render", || render_dataset(&places, &options, renderer))?;
-        let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
-        step(4, "baseline", || make_submissions(&places, &options, &dataset))?;
-        step(5, "eval score", || score_submissions(&places, &options, &dataset, lpips))?;
-        step(6, "leaderboard", || write_leaderboard(&places, &options, &dataset))?;
-        close(&places, &options, &dataset, self.full)?;
+        step(2, "prep build", || build_dataset(&demo))?;
+        step(3, "prep render", || render_dataset(&demo, &options, renderer))?;
+        let dataset = Dataset::open(&demo.dataset).context("cannot open the dataset")?;
+        step(4, "baseline", || make_submissions(&demo, &options, &dataset))?;
+        step(5, "eval score", || score_submissions(&demo, &options, &dataset, lpips))?;
+        step(6, "leaderboard", || write_leaderboard(&demo, &options, &dataset))?;
+        close(&demo, &options, &dataset, self.full)?;
         Ok(Outcome::Good)
     }
 
@@ -207,16 +206,16 @@ impl DemoArgs {
 }
 
 /// The options of an earlier demo in the folder. Fails where the folder holds anything else.
-fn earlier_options(places: &Places) -> anyhow::Result<Option<Options>> {
+fn earlier_options(demo: &DemoFolder) -> anyhow::Result<Option<Options>> {
     let is_empty = |folder: &Path| std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
-    if !places.out.exists() || is_empty(&places.out) {
+    if !demo.out.exists() || is_empty(&demo.out) {
         return Ok(None);
     }
-    match json::read(&places.options) {
+    match json::read(&demo.options) {
         Ok(options) => Ok(Some(options)),
         Err(reason) => bail!(
             "'{}' exists and does not hold a demo of this version ({reason}); choose another --out",
-            places.out.display()
+            demo.out.display()
         ),
     }
 }
@@ -243,23 +242,26 @@ fn choose_renderer(args: &DemoArgs, earlier: Option<&Options>) -> anyhow::Result
 
 /// Makes the folder, or checks that it holds a demo of these options; with `force`, removes an earlier demo. What
 /// depends on the weights of LPIPS is removed where they were missing and are found now.
-fn begin(places: &Places, earlier: Option<&Options>, options: &Options, force: bool) -> anyhow::Result<()> {
-    let out = places.out.display();
+fn begin(demo: &DemoFolder, earlier: Option<&Options>, options: &Options, force: bool) -> anyhow::Result<()> {
+    let out = demo.out.display();
     let Some(earlier) = earlier else {
-        return std::fs::create_dir_all(&places.out).with_context(|| format!("cannot create '{out}'"));
+        return std::fs::create_dir_all(&demo.out).with_context(|| format!("cannot create '{out}'"));
     };
-    let Places { source, dataset, submissions, delit, results, scores, leaderboard, .. } = places;
+    let DemoFolder { source, dataset, submissions, delit, results, pictures, leaderboard, .. } = demo;
     let remove = |folders: &[&PathBuf]| folders.iter().try_for_each(|folder| work_folder::remove(folder));
     if force {
-        remove(&[source, dataset, submissions, delit, results, scores, leaderboard])?;
+        remove(&[source, dataset, submissions, delit, results, pictures, leaderboard])?;
     } else if options.lpips && *earlier == (Options { lpips: false, ..options.clone() }) {
-        remove(&[results, scores, leaderboard])?;
+        remove(&[results, pictures, leaderboard])?;
     } else if earlier != options {
         bail!(
             "'{out}' holds a demo that was run with other options or another version ({}); run it again with those, add \
              --force to replace it, or choose another --out",
             earlier.in_words()
         );
+    } else if !pictures.exists() {
+        // The score makes them, and takes no results that are there.
+        remove(&[results, leaderboard])?;
     }
     Ok(())
 }
@@ -287,18 +289,11 @@ fn step(number: u8, name: &str, work: impl FnOnce() -> anyhow::Result<String>) -
     Ok(())
 }
 
-/// Prints warnings and errors; the sample has none.
-fn say_warnings(title: &str, findings: &[Finding]) {
-    for finding in findings.iter().filter(|finding| finding.severity != Severity::Note) {
-        say(&format!("{title}: {finding}"));
-    }
-}
-
-fn build_dataset(places: &Places) -> anyhow::Result<String> {
+fn build_dataset(demo: &DemoFolder) -> anyhow::Result<String> {
     let options = BuildOptions {
-        recipe: places.source.join("recipe.toml"),
+        recipe: demo.source.join("recipe.toml"),
         source: None,
-        out: places.dataset.clone(),
+        out: demo.dataset.clone(),
         scenes: Vec::new(),
         force: false,
         blender: None,
@@ -308,16 +303,16 @@ fn build_dataset(places: &Places) -> anyhow::Result<String> {
     for (scene, findings) in &report.findings {
         say_warnings(scene.as_str(), findings);
     }
-    let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
+    let dataset = Dataset::open(&demo.dataset).context("cannot open the dataset")?;
     let instances: usize = dataset.scenes.iter().map(|scene| scene.instances.len()).sum();
     let views: usize = dataset.scenes.iter().map(|scene| scene.views.len()).sum();
     let scenes = counted(dataset.scenes.len(), "scene");
     Ok(format!("{scenes}, {}, {}", counted(instances, "object"), counted(views, "view")))
 }
 
-fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> anyhow::Result<String> {
+fn render_dataset(demo: &DemoFolder, options: &Options, renderer: Renderer) -> anyhow::Result<String> {
     let render_options = RenderOptions { renderer, samples: Some(options.samples), scenes: Vec::new(), force: false };
-    let report = with_progress(|progress| render(&places.dataset, &render_options, progress))
+    let report = with_progress(|progress| render(&demo.dataset, &render_options, progress))
         .context("cannot render the dataset")?;
     report.remarks.iter().for_each(|line| say(line));
     if !report.failures.is_empty() {
@@ -326,10 +321,10 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
         bail!("{failed} could not be rendered; run the demo again to go on from here");
     }
     let reference_options = ReferenceOptions { samples: options.reference_samples, scenes: Vec::new(), force: false };
-    let references = with_progress(|progress| make_references(&places.dataset, &reference_options, progress))
+    let references = with_progress(|progress| make_references(&demo.dataset, &reference_options, progress))
         .context("cannot render the scorer's references")?;
     if references.rendered > 0 {
-        with_progress(|progress| finish_again(&places.dataset, progress)).context("cannot finish the dataset")?;
+        with_progress(|progress| finish_again(&demo.dataset, progress)).context("cannot finish the dataset")?;
     }
     let (by, samples) = (options.renderer.word(), options.samples);
     let kept = if report.kept > 0 { format!(", {} kept", report.kept) } else { String::new() };
@@ -338,11 +333,11 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
 }
 
 /// Makes the submissions that do not exist yet. They appear whole or not at all.
-fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
-    std::fs::create_dir_all(&places.submissions)
-        .with_context(|| format!("cannot create '{}'", places.submissions.display()))?;
+fn make_submissions(demo: &DemoFolder, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
+    std::fs::create_dir_all(&demo.submissions)
+        .with_context(|| format!("cannot create '{}'", demo.submissions.display()))?;
     for &baseline in &options.baselines {
-        let out = places.submission(baseline);
+        let out = demo.submission(baseline);
         if out.exists() {
             continue;
         }
@@ -356,13 +351,13 @@ fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> an
                 median::write(dataset, &out, false, &EstimateSource::Input, MedianOf::Instances, progress)
             })?,
             DemoBaseline::Procedural | DemoBaseline::ProceduralKeepSeen => {
-                if !places.delit.exists() {
+                if !demo.delit.exists() {
                     with_progress(|progress| {
-                        delight::write(dataset, &places.delit, &DelightOptions::default(), progress)
+                        delight::write(dataset, &demo.delit, &DelightOptions::default(), progress)
                     })?;
                 }
                 let adapter = Box::new(Adapter::find("delight")?);
-                let source = EstimateSource::Files { folder: places.delit.clone(), adapter };
+                let source = EstimateSource::Files { folder: demo.delit.clone(), adapter };
                 let keep_seen = baseline == DemoBaseline::ProceduralKeepSeen;
                 let procedural = ProceduralOptions { keep_seen, ..ProceduralOptions::default() };
                 with_progress(|progress| procedural::write(dataset, &out, false, &source, &procedural, progress))?
@@ -375,100 +370,101 @@ fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> an
 
 /// Scores the submissions that have no result yet.
 fn score_submissions(
-    places: &Places,
+    demo: &DemoFolder,
     options: &Options,
     dataset: &Dataset,
     lpips: LpipsWeights,
 ) -> anyhow::Result<String> {
-    std::fs::create_dir_all(&places.results)
-        .with_context(|| format!("cannot create '{}'", places.results.display()))?;
+    std::fs::create_dir_all(&demo.results).with_context(|| format!("cannot create '{}'", demo.results.display()))?;
     let missing: Vec<DemoBaseline> =
-        options.baselines.iter().copied().filter(|baseline| !places.result(*baseline).exists()).collect();
+        options.baselines.iter().copied().filter(|baseline| !demo.result(*baseline).exists()).collect();
     if !missing.is_empty() {
-        let submissions: Vec<PathBuf> = missing.iter().map(|baseline| places.submission(*baseline)).collect();
-        let (submissions, protocols) =
-            (submissions.iter().map(PathBuf::as_path).collect(), vec![Protocol::named(PROTOCOL)?]);
-        let plan = ScorePlan::new(dataset, submissions, protocols, lpips, TOOL);
-        let plan = ScorePlan { cache: Some(&places.scores), ..plan };
+        let folders: Vec<PathBuf> = missing.iter().map(|baseline| demo.submission(*baseline)).collect();
+        let methods = folders.iter().map(|path| SubmissionJson::read(path)).collect::<Result<Vec<_>, _>>()?;
+        let (ranked, _) = results_and_ceiling(demo, options);
+        let keep = |seen: &SeenLight| match ranked.contains(&missing[seen.submission]) {
+            true => keep_seen(&demo.pictures, &methods[seen.submission].file.method, seen),
+            false => Ok(()),
+        };
+        let submissions = folders.iter().map(PathBuf::as_path).collect();
+        let plan = ScorePlan::new(dataset, submissions, vec![Protocol::named(Protocol::DEFAULT)?], lpips, TOOL);
+        let plan = ScorePlan { seen: Some(&keep), ..plan };
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
-        for (result, baseline) in results.iter().zip(missing) {
-            json::write_lines(&places.result(baseline), result)?;
+        for (result, baseline) in results.iter().zip(&missing) {
+            json::write_lines(&demo.result(*baseline), result)?;
             say_warnings(&result.method, &result.findings);
         }
-        work_folder::remove(&places.scores)?;
     }
     Ok(counted(options.baselines.len(), "result"))
 }
 
 /// The baselines that are ranked, and the result of the truth as their ceiling, if it is not the only baseline.
-fn results_and_ceiling(places: &Places, options: &Options) -> (Vec<DemoBaseline>, Option<PathBuf>) {
+fn results_and_ceiling(demo: &DemoFolder, options: &Options) -> (Vec<DemoBaseline>, Option<PathBuf>) {
     let has_ceiling = options.baselines.len() > 1 && options.baselines.contains(&DemoBaseline::Gt);
     let ranked = options.baselines.iter().copied().filter(|baseline| !has_ceiling || *baseline != DemoBaseline::Gt);
-    (ranked.collect(), has_ceiling.then(|| places.result(DemoBaseline::Gt)))
+    (ranked.collect(), has_ceiling.then(|| demo.result(DemoBaseline::Gt)))
 }
 
-fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
-    let (ranked, ceiling) = results_and_ceiling(places, options);
-    let results = ranked.iter().map(|baseline| places.result(*baseline)).collect();
+fn write_leaderboard(demo: &DemoFolder, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
+    let (ranked, ceiling) = results_and_ceiling(demo, options);
+    let results = ranked.iter().map(|baseline| demo.result(*baseline)).collect();
     let entries =
         entries::read(&ResultsFolder { results, ceiling, ..ResultsFolder::default() }, &TrustedKeys::default())?;
-    // The pictures that SSIM and LPIPS compare.
-    let samples = Protocol::named(PROTOCOL)?.light.samples.each_half;
     let plan = LeaderboardPlan {
         results: &entries.results,
         ceiling: entries.ceiling.as_ref(),
         verified: entries.verified.clone(),
-        protocol: PROTOCOL,
+        protocol: Protocol::DEFAULT,
         partial: false,
         errata: None,
         about: None,
-        pictures: None,
+        pictures: Some(&demo.pictures),
         submissions: Some(Submissions {
             dataset,
-            folders: ranked.iter().map(|baseline| places.submission(*baseline)).collect(),
-            shown: vec![Shown::Albedo, Shown::Light { track: Track::True, samples }],
+            folders: ranked.iter().map(|baseline| demo.submission(*baseline)).collect(),
+            shown: vec![Shown::Albedo],
         }),
         votes: false,
         tool: TOOL.to_owned(),
     };
-    with_progress(|progress| leaderboard::write(&plan, &places.leaderboard, true, progress))
+    with_progress(|progress| leaderboard::write(&plan, &demo.leaderboard, true, progress))
         .context("cannot write the leaderboard")?;
     let scenes = counted(dataset.scenes.len(), "scene");
     Ok(format!("{}, pictures of {scenes}", counted(ranked.len(), "method")))
 }
 
 /// Prints the table, the address of the leaderboard and the next commands.
-fn close(places: &Places, options: &Options, dataset: &Dataset, full: bool) -> anyhow::Result<()> {
-    let (ranked, ceiling) = results_and_ceiling(places, options);
+fn close(demo: &DemoFolder, options: &Options, dataset: &Dataset, full: bool) -> anyhow::Result<()> {
+    let (ranked, ceiling) = results_and_ceiling(demo, options);
     let read = |path: PathBuf| ResultFile::read(&path);
-    let results = ranked.iter().map(|baseline| read(places.result(*baseline))).collect::<Result<Vec<_>, _>>()?;
+    let results = ranked.iter().map(|baseline| read(demo.result(*baseline))).collect::<Result<Vec<_>, _>>()?;
     let ceiling = ceiling.map(read).transpose()?;
     let format = TableFormat::Text { bold: std::io::stdout().is_terminal(), columns: columns() };
     let shown = match full {
-        true => tables(&results, ceiling.as_ref(), PROTOCOL, Grouping::Dataset, format)?,
-        false => headline(&results, ceiling.as_ref(), PROTOCOL, format)?,
+        true => tables(&results, ceiling.as_ref(), Protocol::DEFAULT, Grouping::Dataset, format)?,
+        false => headline(&results, ceiling.as_ref(), Protocol::DEFAULT, format)?,
     };
-    let page = std::path::absolute(places.leaderboard.join("index.html"))?;
+    let page = std::path::absolute(demo.leaderboard.join("index.html"))?;
     print(&format!("\n{shown}\nThe leaderboard, with pictures:\n  {}\n", address(&page)))?;
     if full {
         let rooms = dataset.file.scenes.iter().map(|id| dataset.folder(id).path().join("views").display().to_string());
         print(&format!("The rooms' pictures: {}\n", rooms.collect::<Vec<_>>().join(", ")))?;
     }
-    print(&next_commands(places, options))
+    print(&next_commands(demo, options))
 }
 
 /// Three commands that add a method to the leaderboard.
-fn next_commands(places: &Places, options: &Options) -> String {
-    let (ranked, ceiling) = results_and_ceiling(places, options);
+fn next_commands(demo: &DemoFolder, options: &Options) -> String {
+    let (ranked, ceiling) = results_and_ceiling(demo, options);
     let [dataset, submission, result, board] = [
-        places.dataset.clone(),
-        places.submissions.join("median-photo"),
-        places.results.join("median-photo.json"),
-        places.out.join("board"),
+        demo.dataset.clone(),
+        demo.submissions.join("median-photo"),
+        demo.results.join("median-photo.json"),
+        demo.out.join("board"),
     ]
     .map(|path| quoted(&path));
     let [dataset, submission, result, board] = [&dataset, &submission, &result, &board].map(String::as_str);
-    let others: Vec<String> = ranked.iter().map(|baseline| quoted(&places.result(*baseline))).collect();
+    let others: Vec<String> = ranked.iter().map(|baseline| quoted(&demo.result(*baseline))).collect();
     let ceiling = ceiling.map(|ceiling| quoted(&ceiling));
     let mut rank = vec!["mateval", "eval", "leaderboard"];
     rank.extend(others.iter().map(String::as_str));
@@ -548,7 +544,7 @@ mod tests {
     #[test]
     fn weights_that_were_fetched_meanwhile_are_used() {
         let folder = tempfile::tempdir().unwrap();
-        let places = Places::of(folder.path());
+        let demo = DemoFolder::of(folder.path());
         let options = |lpips, samples| Options {
             tool: TOOL.to_owned(),
             scorer_version: SCORER_VERSION,
@@ -559,15 +555,19 @@ mod tests {
             baselines: vec![DemoBaseline::Grey],
             lpips,
         };
-        for place in [&places.dataset, &places.submissions, &places.results, &places.leaderboard] {
+        for place in [&demo.dataset, &demo.submissions, &demo.results, &demo.pictures, &demo.leaderboard] {
             std::fs::create_dir(place).unwrap();
         }
-        begin(&places, Some(&options(false, 1)), &options(true, 2), false).unwrap_err();
-        begin(&places, Some(&options(true, 1)), &options(false, 1), false).unwrap_err();
-        assert!(places.results.exists(), "a refusal removed something");
-        begin(&places, Some(&options(false, 1)), &options(true, 1), false).unwrap();
-        assert!(!places.results.exists() && !places.leaderboard.exists());
-        assert!(places.dataset.exists() && places.submissions.exists());
+        begin(&demo, Some(&options(false, 1)), &options(true, 2), false).unwrap_err();
+        begin(&demo, Some(&options(true, 1)), &options(false, 1), false).unwrap_err();
+        assert!(demo.results.exists(), "a refusal removed something");
+        begin(&demo, Some(&options(false, 1)), &options(true, 1), false).unwrap();
+        assert!(!demo.results.exists() && !demo.pictures.exists() && !demo.leaderboard.exists());
+        assert!(demo.dataset.exists() && demo.submissions.exists());
+        // Results without the pictures of their score, as an earlier version left them.
+        std::fs::create_dir(&demo.results).unwrap();
+        begin(&demo, Some(&options(true, 1)), &options(true, 1), false).unwrap();
+        assert!(!demo.results.exists());
     }
 
     #[test]

@@ -127,7 +127,7 @@ pub struct ScoreArgs {
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
     /// Protocol to score under, `capture-1` for captured rooms; may be given several times.
-    #[arg(long = "protocol", value_name = "PROTOCOL", default_values = ["mateval-3"])]
+    #[arg(long = "protocol", value_name = "PROTOCOL", default_values = [Protocol::DEFAULT])]
     protocols: Vec<String>,
     /// Number of scenes that are scored at once. More take more memory and leave fewer threads idle.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
@@ -197,6 +197,7 @@ impl ScoreArgs {
             cache: Some(&cache),
             only_cached: self.only_cached,
             pictures: self.pictures.as_deref(),
+            seen: None,
         };
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
         for (result, out) in results.iter().zip(&outs) {

@@ -19,6 +19,9 @@ use crate::terminal::{Outcome, error_text, print, say};
 /// The command that downloads missing weights.
 pub const FETCH_LPIPS: &str = "mateval fetch lpips";
 
+/// The command that installs Blender.
+pub const FETCH_BLENDER: &str = "mateval fetch blender";
+
 const LPIPS: &str = include_str!("fetch/lpips_weights.py");
 const BLENDER: &str = include_str!("fetch/blender_module.py");
 /// The module that both scripts import.

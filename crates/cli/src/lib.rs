@@ -113,7 +113,7 @@ fn with_tip(mut refusal: clap::Error, words: &[OsString]) -> clap::Error {
         _ => None,
     };
     if let Some(tip) = tip {
-        // Of a command with the same name elsewhere, those that only resemble it distract.
+        // Where the name exists elsewhere, clap's list of similar names distracts.
         refusal.remove(ContextKind::SuggestedSubcommand);
         refusal.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }

@@ -73,12 +73,17 @@ pub fn say(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// Prints warnings and errors to stderr, each after `title`; notes are only counted, and can be read in `file`.
-pub fn say_findings(title: &str, findings: &[Finding], file: &str) {
-    let notes = findings.iter().filter(|finding| finding.severity == Severity::Note).count();
+/// Prints warnings and errors to stderr, each after `title`.
+pub fn say_warnings(title: &str, findings: &[Finding]) {
     for finding in findings.iter().filter(|finding| finding.severity != Severity::Note) {
         say(&format!("{title}: {finding}"));
     }
+}
+
+/// Prints warnings and errors as [`say_warnings`] does; notes are only counted, and can be read in `file`.
+pub fn say_findings(title: &str, findings: &[Finding], file: &str) {
+    say_warnings(title, findings);
+    let notes = findings.iter().filter(|finding| finding.severity == Severity::Note).count();
     if notes > 0 {
         say(&format!("{title}: {}, in {file}", counted(notes, "note")));
     }

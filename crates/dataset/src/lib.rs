@@ -6,10 +6,50 @@
 //! `format` (the files of a dataset and of a submission), `records` (what commands note of their work on a dataset).
 //! [`open`] reads a dataset through all of them.
 
-mod foreign;
-mod format;
-mod records;
-mod values;
+mod foreign {
+    //! Reads untrusted files of formats that are not ours: glTF and OBJ, with their materials.
+
+    pub mod gltf_file;
+    pub mod obj;
+    pub mod specular_glossiness;
+}
+
+mod format {
+    //! The files of a dataset and of a submission: their JSON types, paths, geometry and manifest.
+
+    pub mod dataset;
+    pub mod glb;
+    pub mod json;
+    pub mod layout;
+    pub mod manifest;
+    pub mod measured;
+    pub mod reference;
+    pub mod submission;
+    pub mod withheld;
+}
+
+mod records {
+    //! What commands note of their work on a dataset: who is changing what, how pictures were rendered, what a scene has
+    //! cost, whether two renderers agree.
+
+    pub mod changes;
+    pub mod render_file;
+    pub mod scene_cost;
+    pub mod verdict;
+}
+
+mod values {
+    //! What a scene consists of, whatever file holds it: ids, cameras, meshes with their atlases, materials, findings.
+
+    pub mod camera;
+    pub mod findings;
+    pub mod ids;
+    pub mod lens;
+    pub mod lighting;
+    pub mod material;
+    pub mod mesh;
+    pub mod uv_atlas;
+}
 
 pub mod error;
 pub mod open;

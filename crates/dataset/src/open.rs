@@ -351,6 +351,11 @@ pub struct DatasetId {
 }
 
 impl SceneFile {
+    /// Reads the `scene.json` of a scene that `prep` works on. [`Dataset::open`] also checks its format and id.
+    pub fn read(folder: &SceneFolder) -> Result<Self, DatasetError> {
+        json::read(&folder.scene_file())
+    }
+
     /// Fails where the true materials are not known, for work that needs them.
     pub fn check_materials_known(&self) -> Result<(), DatasetError> {
         match self.source.kind.states_materials() {

@@ -4,9 +4,9 @@
 //! cargo bench -p mateval-eval --bench spread -- DATASET SCENE SEEDS SAMPLES REFERENCE_SAMPLES SUBMISSION...
 //! ```
 //!
-//! SAMPLES per pixel of each half are those of the protocol if 0; REFERENCE_SAMPLES are those of the run that stands for the
-//! exact value. Prints a row for each submission and number of light: its mean over seeds, its bias, its spread, and, of
-//! PSNR, the stated error divided by the spread.
+//! SAMPLES per pixel of each half are those of the protocol if 0; REFERENCE_SAMPLES are those of the run that stands
+//! for the exact value. Prints a row for each submission and number of light: its mean over seeds, its bias, its
+//! spread, and, of PSNR, the stated error divided by the spread.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "measurements are printed")]
 

@@ -10,18 +10,62 @@
 //!
 //! Two passes over the texels: the means, from which the scales of aligned answers follow; then everything else.
 
-use mateval_dataset::Progress;
+use std::path::Path;
+
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::lighting::LightingName;
+use mateval_dataset::open::Dataset;
+use mateval_dataset::{Finding, Progress, Severity};
 use mateval_image::{LUMINANCE, LinearRgb, Texture};
 use mateval_metrics::color_difference;
-use mateval_submission::prediction::PredictedScene;
+use mateval_submission::atlas::AtlasMeshes;
+use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_submission::texel_map::TexelMap;
 
 use crate::error::EvalError;
 use crate::materials::texels::each_atlas;
-use crate::open_scene::OpenScene;
-use crate::result::constancy::{Constancy, Deviation, PartSpread};
+use crate::result::{Constancy, Deviation, PartSpread};
+use crate::truth::OpenScene;
+
+/// The answers of a submission to the twins of a scene.
+pub(crate) struct Twins {
+    pub(crate) answers: Vec<(LightingName, PredictedScene)>,
+    pub(crate) findings: Vec<Finding>,
+}
+
+impl Twins {
+    /// `atlases` are the scene's, which its twins share.
+    pub(crate) fn read(
+        dataset: &Dataset,
+        submission: &Path,
+        scene: &SceneFile,
+        atlases: &AtlasMeshes<'_>,
+    ) -> Result<Self, EvalError> {
+        let (mut answers, mut findings) = (Vec::new(), Vec::new());
+        for twin in dataset.twins_of(&scene.id) {
+            let Some(shown) = dataset.file.twins.get(&twin.id) else { continue };
+            let mut answer = read_scene(submission, twin, atlases)?;
+            if answer.files.is_empty() {
+                let message = format!("the submission holds no map of this twin of scene '{}'", scene.id);
+                let action = "constancy has no value in that scene; answer each twin from its own photo";
+                let file = format!("scenes/{}", twin.id);
+                findings.push(Finding::new(Severity::Note, "twin_not_predicted", file, "", message, action));
+            } else {
+                findings.append(&mut answer.findings);
+            }
+            answers.push((shown.lighting, answer));
+        }
+        Ok(Self { answers, findings })
+    }
+
+    /// All answers to the family. Absent where the scene has no twins, or where the submission holds no map of the
+    /// scene or of one of them.
+    pub(crate) fn members<'a>(&'a self, prediction: &'a PredictedScene) -> Option<Vec<&'a PredictedScene>> {
+        let answers = self.answers.iter().map(|(_, answer)| answer);
+        let members: Vec<&PredictedScene> = std::iter::once(prediction).chain(answers).collect();
+        (members.len() > 1 && members.iter().all(|member| !member.files.is_empty())).then_some(members)
+    }
+}
 
 /// The answers to a family: those to the scene first, then those to its twins.
 pub(crate) struct Family<'a> {

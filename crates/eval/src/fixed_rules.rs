@@ -52,9 +52,9 @@ fixed_rules! {
     /// out.
     missing_base_color: f32 = mateval_dataset::submission::GREY,
     /// Value that replaces a missing or unsound roughness, as the format promises.
-    missing_roughness: f32 = map_file::MISSING_ROUGHNESS,
+    missing_roughness: f32 = mateval_dataset::submission::MISSING_ROUGHNESS,
     /// Value that replaces a missing or unsound metallic, as the format promises.
-    missing_metallic: f32 = map_file::MISSING_METALLIC,
+    missing_metallic: f32 = mateval_dataset::submission::MISSING_METALLIC,
     /// A texel of a base colour with a value outside this range is bad, by the format.
     base_color_range: [f32; 2] = [*map_file::BASE_COLOR_RANGE.start(), *map_file::BASE_COLOR_RANGE.end()],
     /// A texel of a roughness or metallic with a value outside this range is bad, by the format.
@@ -129,7 +129,8 @@ fixed_rules! {
 }
 
 impl FixedRules {
-    /// The key, as in `fixed.ssim_k1`, of the first constant, by name, in which the two differ, and both of its values as JSON.
+    /// The key, as in `fixed.ssim_k1`, of the first constant, by name, in which the two differ, and both of its values
+    /// as JSON.
     pub fn first_difference(&self, other: &Self) -> Option<(String, [String; 2])> {
         let values = |rules: &Self| serde_json::to_value(rules).expect("numbers and words become JSON");
         let (ours, theirs) = (values(self), values(other));

@@ -4,16 +4,16 @@
 //! [`verify`], whether a result states what the submission scores.
 //!
 //! [`metric`] is the table of metrics; [`protocol`] holds the constants that protocols may change, [`fixed_rules`]
-//! those that they may not. For each [`scene`] of the dataset ([`open_scene`]), [`score()`](score::score) reads the
-//! submissions' maps ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
+//! those that they may not. For each [`scene`] of the dataset ([`truth::OpenScene`]), [`score()`](score::score) reads
+//! the submissions' maps ([`read_scene`](mateval_submission::prediction::read_scene)) and takes three steps:
 //!
 //! 1. [`materials::score`] looks up the maps in every view ([`materials::pictures`]) and compares the pictures with the
 //!    [`truth`]'s, base colour also without its scale.
 //! 2. [`light`] renders the maps under every light and compares the renders with R, the scorer's own render of the true
-//!    maps ([`light::reference`]). The true maps travel along the paths of every prediction (`light::shared_paths`,
-//!    [`light::own_lights`]), so that what few paths miss or exaggerate of both cancels: [`light::difference`] turns
-//!    four quarters into two estimates of the encoded difference from R, which are exactly zero for the true maps, and
-//!    [`light::mse`] states their noise; `light::score` makes PSNRs of them. Protocol `paper` compares with the photo's renderer instead
+//!    maps ([`light::reference`]). The true maps travel along the paths of every prediction that is not a copy of the truth
+//!    ([`light::own_lights`]), so that noise common to both cancels. [`light::difference`] turns four quarters into two
+//!    estimates of the encoded difference from R, exactly zero for the true maps; [`light::mse`] states their noise,
+//!    and `light::score` makes PSNRs of both. Protocol `paper` compares with the photo's renderer instead
 //!    ([`light::fitted_lights`]).
 //! 3. [`materials::texels`] compares the maps texel by texel.
 //!
@@ -23,13 +23,13 @@
 //! renders under fitted lights are compared with its photos.
 //!
 //! A [`result`] lists every value by scene, view and picture, with its key ([`result::key`]), and their means
-//! ([`result::means`]) with their errors: pictures to scenes, scenes to the dataset. [`shown`] has the pictures behind the numbers.
+//! ([`result::means()`]) with their errors: pictures to scenes, scenes to the dataset. [`shown`] has the pictures
+//! behind the numbers.
 
 pub mod constancy;
 pub mod error;
 pub mod fixed_rules;
 pub mod metric;
-pub mod open_scene;
 mod pictures_dir;
 pub mod protocol;
 pub mod result;

@@ -2,9 +2,10 @@
 //! --pictures`).
 //!
 //! `<folder>/<scene>/<view>/` holds `albedo`, `albedo_of_true_atlas`, `roughness` and `metallic` of the prediction, and
-//! for each lighting (`true`, `warm_cool`, `alone_1`) a folder with `reference` (R), `quarter_0` to `quarter_3` (the four
-//! m_i), `guided_0` and `guided_1` (g R + F of either half), `ratio` (r) and `shown`: linear and exposed, as float EXR.
-//! `<folder>/<scene>/texels/<instance>.exr` holds what errors of texels are computed from.
+//! for each lighting (`rgb_true`, `rgb_relit-warm_cool`, `rgb_relit-alone_1`) a folder with `reference` (R),
+//! `quarter_0` to `quarter_3` (the four m_i), `guided_0` and `guided_1` (g R + F of either half), `ratio` (r) and
+//! `shown`: linear and exposed, as float EXR. `<folder>/<scene>/texels/<instance>.exr` holds what errors of texels are
+//! computed from.
 
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,7 @@ use mateval_image::{LinearRgb, Picture, exr_io};
 use crate::error::EvalError;
 use crate::light::difference::{ViewGuide, guided_mean, mean_of};
 use crate::materials::pictures::MaterialPictures;
+use crate::protocol::Track;
 
 pub struct PicturesDir {
     /// A folder for each submission, in the order of the plan.
@@ -62,11 +64,12 @@ impl PicturesDir {
         &self,
         submission: usize,
         (scene, view): (&SceneId, &ViewId),
-        lighting: Option<LightingName>,
+        (track, lighting): (Track, Option<LightingName>),
         quarters: &[Picture<LinearRgb>],
         guide: &ViewGuide<'_>,
     ) -> Result<(), EvalError> {
-        let name = lighting.map_or_else(|| "true".to_owned(), |name| name.to_string());
+        let kind = track.picture();
+        let name = lighting.map_or_else(|| kind.to_string(), |name| format!("{kind}-{name}"));
         let folder = self.view(submission, scene, view).join(&name);
         write(&folder, "reference", guide.reference)?;
         write(&folder, "ratio", guide.ratio)?;

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use mateval_dataset::SceneId;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::lighting::RelitRules;
 use mateval_dataset::material::PrincipledFlavour;
+use mateval_dataset::{SceneId, word_enum};
 use mateval_light::light_fit::FitRules;
 use mateval_light::light_stage::StageRules;
 use mateval_light::photo_pixels::PhotoRules;
@@ -83,7 +83,10 @@ pub const SCORER_VERSION: u32 = 12;
 const CAPTURE: &str = "capture-1";
 
 impl Protocol {
-    pub const NAMES: [&str; 3] = ["mateval-3", "paper", CAPTURE];
+    pub const NAMES: [&str; 3] = [Self::DEFAULT, "paper", CAPTURE];
+
+    /// The protocol of commands that name none.
+    pub const DEFAULT: &str = "mateval-3";
 
     pub fn named(name: &str) -> Result<Self, EvalError> {
         // PSNR under fitted light is near 22 dB, so 16 plain samples are enough.
@@ -93,7 +96,7 @@ impl Protocol {
             light
         };
         let (mask_rule, albedo_space, light) = match name {
-            "mateval-3" => {
+            Self::DEFAULT => {
                 let tracks = vec![Track::True, Track::Relit];
                 (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
             }
@@ -106,7 +109,7 @@ impl Protocol {
             name: name.to_owned(),
             mask_rule,
             albedo_space,
-            // The paper has none.
+            // The paper has no views from other places.
             wide_views: name != "paper",
             rounded_decimals: 6,
             headline: match name {
@@ -162,17 +165,16 @@ impl Protocol {
     }
 }
 
-/// The light under which a prediction is rendered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Track {
+word_enum! {
+    /// The light under which a prediction is rendered.
+    Track, a "track":
     /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT, captures) or the scene's own
     /// emitters (Bitterli).
-    Fitted,
+    Fitted = "fitted",
     /// The scene's own emitters.
-    True,
+    True = "true",
     /// The same emitters with weights that no method has seen. Only together with `true`.
-    Relit,
+    Relit = "relit",
 }
 
 impl Track {
@@ -258,8 +260,8 @@ mod tests {
         assert_eq!(prints.len(), 6);
     }
 
-    /// `PROTOCOL.md` holds the table of metrics and the hashes; with `MATEVAL_WRITE_DOCS=1` this writes them. A constant
-    /// that changes a hash raises [`SCORER_VERSION`] if numbers of the same protocol change.
+    /// `PROTOCOL.md` holds the table of metrics and the hashes; with `MATEVAL_WRITE_DOCS=1` this writes them. A
+    /// constant that changes a hash raises [`SCORER_VERSION`] if numbers of the same protocol change.
     #[test]
     fn published_tables_hold() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../dataset_spec/PROTOCOL.md");

@@ -1,4 +1,5 @@
-//! The types of `RESULT.json`: every number, its inputs, and what is missing.
+//! The types of `RESULT.json`: every number, its inputs, and what is missing; and its means, of pictures to scenes and
+//! of scenes to the dataset.
 
 use std::collections::BTreeMap;
 
@@ -9,17 +10,15 @@ use mateval_dataset::submission::Cost;
 use mateval_dataset::word_enum::UnknownWord;
 use mateval_dataset::{Finding, InstanceId, SceneId, ViewId, by_text};
 use mateval_light::light_fit::FittedRadiances;
+use mateval_metrics::Psnr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::metric::{Metric, PictureKind};
+use crate::metric::{HALF_A_BYTE, Metric, PictureKind};
 use crate::protocol::Protocol;
-use crate::result::constancy::Constancy;
 use crate::result::key::{PictureName, Region, ResultKey, Views};
 
-pub mod constancy;
 pub mod key;
-pub mod means;
 
 pub const RESULT_FORMAT: &str = "mateval-result/6";
 
@@ -81,6 +80,63 @@ pub struct SubmissionId {
     /// How the geometry that it was made from differs from the true one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<Perturbation>,
+}
+
+/// The constancy of a submission's base colours in one family.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Constancy {
+    /// The scene that the family shows.
+    pub scene: SceneId,
+    /// The lightings of its twins.
+    pub lightings: Vec<LightingName>,
+    /// The area of the texels that the input view shows, in square metres.
+    pub area_m2: f64,
+    /// Of the base colours as they are.
+    pub raw: Deviation,
+    /// Of the base colours of each scene and twin after one scale a channel, which brings their mean to that of the
+    /// family.
+    pub aligned: Deviation,
+    /// The mean squared error of the family's mean of raw base colours, linear, mean over channels.
+    pub mean_mse: f64,
+    /// The mean CIEDE2000 difference of the family's mean of raw base colours from the truth.
+    pub mean_delta_e: f64,
+}
+
+/// How far the answers to a family lie from their mean. Root mean squares over texels, by area, and over the family.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Deviation {
+    /// Linear, also over channels.
+    pub linear: f64,
+    /// In CIEDE2000, of colours clipped to 0..1.
+    pub delta_e: f64,
+    /// Of the luminance.
+    pub luminance: PartSpread,
+    /// Of what remains of a colour without its luminance, also over channels.
+    pub chroma: PartSpread,
+    /// The deviations of luminance and of chroma, each divided by its contrast: their root mean square. Null where one
+    /// of both contrasts is at most 0.505/255, which counts as none.
+    pub relative: Option<f64>,
+}
+
+/// Of one part of the colours, linear.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartSpread {
+    /// How far the answers to a family lie from their mean.
+    pub deviation: f64,
+    /// How far the texels of the family's mean lie from the mean of all its texels.
+    pub contrast: f64,
+}
+
+impl Deviation {
+    /// The value of [`Self::relative`].
+    pub(crate) fn guarded(&self) -> Option<f64> {
+        let has_contrast = [self.luminance, self.chroma].iter().all(|part| part.contrast > f64::from(HALF_A_BYTE));
+        let square = |part: PartSpread| (part.deviation / part.contrast).powi(2);
+        has_contrast.then(|| ((square(self.luminance) + square(self.chroma)) / 2.0).sqrt())
+    }
 }
 
 /// The scores of one protocol.
@@ -290,5 +346,129 @@ impl PictureValues {
     /// The mean that one of its values counts for.
     pub fn key(&self, metric: Metric) -> ResultKey {
         ResultKey { picture: self.picture, views: Views::of(&self.view, self.region), metric }
+    }
+}
+
+/// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over
+/// its scenes. PSNRs are averaged in dB. A mean skips missing values; the dataset's mean of a key skips scenes without a
+/// value of that key.
+pub fn means(
+    pictures: &[PictureValues],
+    texels: &[InstanceTexelErrors],
+) -> (BTreeMap<SceneId, BTreeMap<ResultKey, f64>>, BTreeMap<ResultKey, f64>) {
+    let of_picture = |picture: &PictureValues| {
+        let key = |metric: &Metric| (picture.scene.clone(), picture.key(*metric));
+        picture.values.iter().map(|(metric, value)| (key(metric), *value)).collect::<Vec<_>>()
+    };
+    let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
+    for ((scene, key), mean) in means_of(pictures.iter().flat_map(of_picture)).into_iter().chain(texel_means(texels)) {
+        scenes.entry(scene).or_default().insert(key, mean);
+    }
+    let summary = means_of(scenes.values().flatten().map(|(key, value)| (*key, *value)));
+    (scenes, summary)
+}
+
+/// The mean of each key's values, which are summed in their order.
+fn means_of<K: Ord>(values: impl Iterator<Item = (K, f64)>) -> BTreeMap<K, f64> {
+    let mut sums: BTreeMap<K, (f64, usize)> = BTreeMap::new();
+    for (key, value) in values {
+        let (sum, count) = sums.entry(key).or_default();
+        *sum += value;
+        *count += 1;
+    }
+    sums.into_iter().map(|(key, (sum, count))| (key, sum / count as f64)).collect()
+}
+
+/// For each scene, of observed and of unobserved texels: the mean squared error weighted by area, and its PSNR.
+fn texel_means(texels: &[InstanceTexelErrors]) -> Vec<((SceneId, ResultKey), f64)> {
+    let mut sums: BTreeMap<(SceneId, ResultKey), [f64; 2]> = BTreeMap::new();
+    for instance in texels {
+        for (views, errors) in [(Views::Observed, &instance.observed), (Views::Unobserved, &instance.unobserved)] {
+            let Some(mse) = errors.base_color_mse else { continue };
+            let key = ResultKey::whole(PictureKind::TextureBaseColor, views, Metric::Mse);
+            let sums = sums.entry((instance.scene.clone(), key)).or_default();
+            sums[0] += errors.area_m2 * mse;
+            sums[1] += errors.area_m2;
+        }
+    }
+    let of = |((scene, key), [sum, area]): ((SceneId, ResultKey), [f64; 2])| {
+        let psnr = Psnr::from_mse(sum / area).ok()?;
+        Some([((scene.clone(), key), sum / area), ((scene, key.with(Metric::Psnr)), psnr.db)])
+    };
+    sums.into_iter().filter_map(of).flatten().collect()
+}
+
+/// The standard error of the dataset's mean of each key, where every scene with a value has one. The noise of different
+/// scenes is independent, since a scene's id is part of its seeds. `scenes` are the scenes' means.
+pub fn summary_noise(
+    noise: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
+    scenes: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
+) -> BTreeMap<ResultKey, f64> {
+    let mut sums: BTreeMap<ResultKey, (usize, f64)> = BTreeMap::new();
+    for (key, error) in noise.values().flatten() {
+        let (count, squares) = sums.entry(*key).or_default();
+        *count += 1;
+        *squares += error * error;
+    }
+    let valued = |key: &ResultKey| scenes.values().filter(|values| values.contains_key(key)).count();
+    let whole = sums.into_iter().filter(|(key, (count, _))| *count == valued(key));
+    whole.map(|(key, (count, squares))| (key, squares.sqrt() / count as f64)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(text: &str) -> ResultKey {
+        text.parse().unwrap()
+    }
+
+    fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValues {
+        let (scene, view) = (SceneId::new(scene).unwrap(), ViewId::new(view).unwrap());
+        let picture = PictureValues::new(scene, view, PictureName::whole(PictureKind::Albedo), region, 1);
+        PictureValues { values: value.map(|value| (Metric::Psnr, value)).into_iter().collect(), ..picture }
+    }
+
+    /// Two instances of 1 and 3 square metres.
+    #[test]
+    fn texels_count_by_area() {
+        let texels = |name: &str, area_m2: f64, mse: f64| InstanceTexelErrors {
+            scene: SceneId::new("a").unwrap(),
+            instance: InstanceId::new(name).unwrap(),
+            observed: TexelErrors { area_m2, base_color_mse: Some(mse) },
+            unobserved: TexelErrors::default(),
+        };
+        let (scenes, summary) = means(&[], &[texels("x", 1.0, 0.04), texels("y", 3.0, 0.0)]);
+        assert!((summary[&key("texture_base_color.observed.mse")] - 0.01).abs() < 1e-15);
+        assert!((summary[&key("texture_base_color.observed.psnr")] - 20.0).abs() < 1e-12);
+        assert_eq!(scenes.values().next().map(BTreeMap::len), Some(2));
+    }
+
+    /// Without the error of one scene, that of the mean is not known.
+    #[test]
+    fn noise_of_scenes_is_independent() {
+        let key = key("rgb_true.input.psnr");
+        let scene = |name: &str, error| (SceneId::new(name).unwrap(), BTreeMap::from([(key, error)]));
+        let scenes = BTreeMap::from([scene("a", 20.0), scene("b", 25.0)]);
+        let both = BTreeMap::from([scene("a", 0.03), scene("b", 0.04)]);
+        assert!((summary_noise(&both, &scenes)[&key] - 0.025).abs() < 1e-15);
+        assert!(summary_noise(&BTreeMap::from([scene("a", 0.1)]), &scenes).is_empty());
+    }
+
+    /// Scene a has two novel views, scene b one: each scene weighs the same.
+    #[test]
+    fn pictures_then_scenes() {
+        let all = [
+            value("a", "up_left", Region::Valid, Some(10.0)),
+            value("a", "up_right", Region::Valid, Some(20.0)),
+            value("b", "up_left", Region::Valid, Some(35.0)),
+            value("a", "up_left", Region::Unobserved, None),
+            value("a", "input", Region::Valid, Some(1.0)),
+        ];
+        let (scenes, summary) = means(&all, &[]);
+        assert_eq!(summary[&key("albedo.novel.psnr")], 25.0);
+        assert_eq!(summary[&key("albedo.input.psnr")], 1.0);
+        assert!(!summary.contains_key(&key("albedo.unobserved.psnr")));
+        assert_eq!(scenes[&SceneId::new("a").unwrap()][&key("albedo.novel.psnr")], 15.0);
     }
 }

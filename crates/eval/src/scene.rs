@@ -8,7 +8,7 @@ use mateval_dataset::layout::INPUT;
 use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, RendererId, SceneId, ViewId};
-use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_light::light_fit::FittedRadiances;
 use mateval_metrics::pixel::pixel_count;
 use mateval_metrics::{Lpips, MetricError};
@@ -16,16 +16,15 @@ use mateval_submission::prediction::PredictedScene;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
-use crate::light::difference::base_color_ratio;
+use crate::light::difference::{LightDifference, base_color_ratio};
 use crate::light::mse::{LightMse, mean_psnr_error};
 use crate::light::reference::StoredReference;
-use crate::metric::PictureKind;
-use crate::open_scene::{OpenScene, ViewSet};
+use crate::metric::{ColorPicture, PictureKind};
 use crate::pictures_dir::PicturesDir;
-use crate::protocol::Protocol;
+use crate::protocol::{Protocol, Track};
 use crate::result::key::{PictureName, Region, ResultKey, Surfaces, Views};
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, MeasuredValues, PictureValues};
-use crate::truth::ViewTruth;
+use crate::truth::{OpenScene, ViewSet, ViewTruth};
 
 /// The inputs for scoring all submissions in one set of views of a scene.
 #[derive(Clone)]
@@ -44,11 +43,44 @@ pub(crate) struct SceneTask<'a> {
     pub(crate) renderer: Option<&'a RendererId>,
     /// Where pictures are kept for whoever recomputes the numbers.
     pub(crate) pictures: Option<&'a PicturesDir>,
+    pub(crate) seen: Option<&'a SeenSink<'a>>,
     pub(crate) progress: Progress<'a>,
 }
 
+/// A view of a submission under light as SSIM compares it, clipped and encoded: for pages.
+pub struct SeenLight<'a> {
+    /// The submission's place in the plan.
+    pub submission: usize,
+    pub scene: &'a SceneId,
+    pub view: &'a ViewId,
+    pub kind: PictureKind,
+    pub valid: &'a Mask,
+    pub reference: &'a Picture<SrgbRgb>,
+    pub prediction: &'a Picture<SrgbRgb>,
+}
+
+pub type SeenSink<'a> = dyn Fn(&SeenLight<'_>) -> Result<(), EvalError> + Sync + 'a;
+
+/// The views of a prediction under one light, compared with the reference.
+pub(crate) struct LitViews<'a> {
+    pub(crate) track: Track,
+    pub(crate) lighting: Option<LightingName>,
+    /// What it is compared with, by view.
+    pub(crate) references: &'a [ColorPicture],
+    pub(crate) views: Vec<LightDifference>,
+    /// For fitted lights, the views under the lights of each of two fits.
+    pub(crate) of_fits: Option<[Vec<LightDifference>; 2]>,
+    pub(crate) fit: Option<FittedRadiances>,
+    /// Contributions of light that were not finite and count as none.
+    pub(crate) not_finite: u64,
+}
+
+/// Takes the views of a prediction, by its number.
+pub(crate) type LitSink<'a> = dyn FnMut(usize, LitViews<'_>) -> Result<(), EvalError> + 'a;
+
 pub(crate) struct BaseColors {
-    /// Looked up in the true atlases as predictions are in theirs, unlike [`ViewTruth::albedo`], which the dataset holds.
+    /// Looked up in the true atlases as predictions are in theirs, unlike [`ViewTruth::albedo`], which the dataset
+    /// holds.
     pub(crate) truth: Vec<Picture<LinearRgb>>,
     pub(crate) predicted: Vec<Vec<Picture<LinearRgb>>>,
 }
@@ -180,8 +212,8 @@ impl ScoreSheet {
 pub(crate) struct InstanceErrors(BTreeMap<(PictureKind, Views, u16), (f64, usize)>);
 
 impl InstanceErrors {
-    /// Adds `error(k)`, a mean over channels, of every pixel k of the view's regions on all surfaces to the instance that
-    /// it shows.
+    /// Adds `error(k)`, a mean over channels, of every pixel k of the view's regions on all surfaces to the instance
+    /// that it shows.
     pub(crate) fn add(
         &mut self,
         picture: PictureKind,

@@ -5,14 +5,12 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mateval_dataset::changes;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::{Dataset, DatasetId};
 use mateval_dataset::submission::{Map, SUBMISSION, SubmissionFile};
 use mateval_dataset::verdict::{CompareCounts, VerdictFile};
-use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json};
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, changes, json};
 use mateval_files::cache::{Cache, Key};
 use mateval_metrics::Lpips;
 use mateval_submission::atlas::AtlasMeshes;
@@ -21,20 +19,19 @@ use mateval_submission::prediction::{PredictedScene, read_scene};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::constancy::Family;
+use crate::constancy::{Family, Twins};
 use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::{score_light, score_photos};
 use crate::metric::{LPIPS_NET, Metric, PictureKind};
-use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::pictures_dir::PicturesDir;
 use crate::protocol::{Protocol, Track};
-use crate::result::constancy::Constancy;
-use crate::result::means::{means, summary_noise};
 use crate::result::{
-    MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
+    Constancy, MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, TracerCheck,
+    means, summary_noise,
 };
-use crate::scene::{SceneScore, SceneTask, ScoreSheet};
+use crate::scene::{SceneScore, SceneTask, ScoreSheet, SeenSink};
+use crate::truth::{OpenScene, ViewSet, scored_views};
 
 /// The largest entry of the cache that is read, in bytes.
 const MOST_CACHED_BYTES: u64 = 256 << 20;
@@ -73,10 +70,13 @@ pub struct ScorePlan<'a> {
     /// A folder for the pictures behind the numbers, which nothing reads back; with several submissions a folder of it
     /// for each. No scores are then taken from the cache.
     pub pictures: Option<&'a Path>,
+    /// Gets every view from the input view's place under the scene's own or fitted light, as pages show it; captured
+    /// rooms pass none. No scores are then taken from the cache.
+    pub seen: Option<&'a SeenSink<'a>>,
 }
 
 /// One submission while it is being scored.
-struct Entry {
+struct SubmissionScores {
     file: SubmissionFile,
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
@@ -85,7 +85,8 @@ struct Entry {
     constancy: Vec<Constancy>,
 }
 
-struct Outcome {
+/// The part of a submission's result that one scene gives.
+struct SceneOutcome {
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
     scores: Vec<SceneScore>,
@@ -126,20 +127,20 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     if let Some(absence) = plan.dataset.absence().filter(|_| plan.scenes.is_empty()) {
         progress(Report::Message(&absence));
     }
-    let mut entries =
+    let mut submissions =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
     for (scene, outcomes) in scenes.iter().zip(score_scenes(plan, &scenes, progress)?) {
-        for (entry, outcome) in entries.iter_mut().zip(outcomes) {
-            entry.findings.extend(outcome.findings);
-            entry.files.extend(outcome.files);
-            entry.constancy.extend(outcome.constancy);
-            for (scores, score) in entry.scores.iter_mut().zip(outcome.scores) {
+        for (submission, outcome) in submissions.iter_mut().zip(outcomes) {
+            submission.findings.extend(outcome.findings);
+            submission.files.extend(outcome.files);
+            submission.constancy.extend(outcome.constancy);
+            for (scores, score) in submission.scores.iter_mut().zip(outcome.scores) {
                 scores.push((scene.id.clone(), score));
             }
         }
     }
     let check = tracer_check(plan.dataset)?;
-    Ok(entries.into_iter().map(|entry| finish(plan, &scenes, check.clone(), entry)).collect())
+    Ok(submissions.into_iter().map(|submission| finish(plan, &scenes, check.clone(), submission)).collect())
 }
 
 /// Outcomes by scene, then by submission. Scores several scenes at a time; the first failure ends the work.
@@ -147,9 +148,9 @@ fn score_scenes(
     plan: &ScorePlan<'_>,
     scenes: &[&SceneFile],
     progress: Progress<'_>,
-) -> Result<Vec<Vec<Outcome>>, EvalError> {
+) -> Result<Vec<Vec<SceneOutcome>>, EvalError> {
     let next = AtomicUsize::new(0);
-    let done: Vec<OnceLock<Result<Vec<Outcome>, EvalError>>> = scenes.iter().map(|_| OnceLock::new()).collect();
+    let done: Vec<OnceLock<Result<Vec<SceneOutcome>, EvalError>>> = scenes.iter().map(|_| OnceLock::new()).collect();
     let work = || {
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
@@ -172,13 +173,18 @@ fn score_scenes(
     done.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-fn score_or_recall(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) -> Result<Vec<Outcome>, EvalError> {
+fn score_or_recall(
+    plan: &ScorePlan<'_>,
+    scene: &SceneFile,
+    progress: Progress<'_>,
+) -> Result<Vec<SceneOutcome>, EvalError> {
     let atlases = AtlasMeshes::on_demand(plan.dataset, scene);
     let read = |path: &&Path| read_scene(path, scene, &atlases);
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(read).collect::<Result<_, _>>()?;
     let mut open = None;
+    let has_sink = plan.pictures.is_some() || plan.seen.is_some();
     let mut scores: Vec<Option<Vec<SceneScore>>> =
-        predictions.iter().map(|p| plan.read_cached(scene, p).filter(|_| plan.pictures.is_none())).collect();
+        predictions.iter().map(|p| plan.read_cached(scene, p).filter(|_| !has_sink)).collect();
     let uncached: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
     if !uncached.is_empty() {
         let chosen: Vec<PredictedScene> = uncached.iter().map(|&at| predictions[at].clone()).collect();
@@ -194,141 +200,18 @@ fn score_or_recall(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'
     let mut outcomes = Vec::new();
     for ((path, prediction), scores) in plan.submissions.iter().zip(predictions).zip(scores) {
         // One family at a time: each member has as many maps as the scene.
-        let twins = Twins::read(plan, path, scene, &atlases)?;
-        let constancy = twins.constancy(plan, scene, &prediction, &mut open, progress)?;
+        let twins = Twins::read(plan.dataset, path, scene, &atlases)?;
+        let constancy = plan.constancy(scene, &prediction, &twins, &mut open, progress)?;
         let (mut findings, mut files) = (prediction.findings, prediction.files);
         findings.extend(twins.findings);
         files.extend(twins.answers.into_iter().flat_map(|(_, answer)| answer.files));
         let scores = scores.expect("scores that were not cached have just been computed");
-        outcomes.push(Outcome { findings, files, scores, constancy });
+        outcomes.push(SceneOutcome { findings, files, scores, constancy });
     }
     Ok(outcomes)
 }
 
-/// The answers of a submission to the twins of a scene.
-struct Twins {
-    answers: Vec<(LightingName, PredictedScene)>,
-    findings: Vec<Finding>,
-}
-
-impl Twins {
-    /// `atlases` are the scene's, which its twins share.
-    fn read(
-        plan: &ScorePlan<'_>,
-        submission: &Path,
-        scene: &SceneFile,
-        atlases: &AtlasMeshes<'_>,
-    ) -> Result<Self, EvalError> {
-        let (mut answers, mut findings) = (Vec::new(), Vec::new());
-        for twin in plan.dataset.twins_of(&scene.id) {
-            let Some(shown) = plan.dataset.file.twins.get(&twin.id) else { continue };
-            let mut answer = read_scene(submission, twin, atlases)?;
-            if answer.files.is_empty() {
-                let message = format!("the submission holds no map of this twin of scene '{}'", scene.id);
-                let action = "constancy has no value in that scene; answer each twin from its own photo";
-                let file = format!("scenes/{}", twin.id);
-                findings.push(Finding::new(Severity::Note, "twin_not_predicted", file, "", message, action));
-            } else {
-                findings.append(&mut answer.findings);
-            }
-            answers.push((shown.lighting, answer));
-        }
-        Ok(Self { answers, findings })
-    }
-
-    /// All answers to the family. Absent where the scene has no twins, or where the submission holds no map of the scene
-    /// or of one of them.
-    fn members<'a>(&'a self, prediction: &'a PredictedScene) -> Option<Vec<&'a PredictedScene>> {
-        let answers = self.answers.iter().map(|(_, answer)| answer);
-        let members: Vec<&PredictedScene> = std::iter::once(prediction).chain(answers).collect();
-        (members.len() > 1 && members.iter().all(|member| !member.files.is_empty())).then_some(members)
-    }
-
-    /// Absent where there are no [`Self::members`]. The scene is opened if it is not yet.
-    fn constancy(
-        &self,
-        plan: &ScorePlan<'_>,
-        scene: &SceneFile,
-        prediction: &PredictedScene,
-        open: &mut Option<OpenScene>,
-        progress: Progress<'_>,
-    ) -> Result<Option<Constancy>, EvalError> {
-        let Some(members) = self.members(prediction) else { return Ok(None) };
-        let key = plan.family_key(scene, &members);
-        if let Some(found) = plan.recall(&key) {
-            return Ok(found);
-        }
-        let open = match open {
-            Some(open) => open,
-            none => none.insert(OpenScene::read(plan.dataset, scene)?),
-        };
-        let lightings = self.answers.iter().map(|(lighting, _)| *lighting).collect();
-        let found = Family { scene, lightings, members }.constancy(open, progress)?;
-        plan.keep(&key, &found)?;
-        Ok(found)
-    }
-}
-
-impl<'a> ScorePlan<'a> {
-    /// All scenes, one after the other, without a cache.
-    pub fn new(
-        dataset: &'a Dataset,
-        submissions: Vec<&'a Path>,
-        protocols: Vec<Protocol>,
-        lpips: LpipsWeights,
-        tool: impl Into<String>,
-    ) -> Self {
-        Self {
-            dataset,
-            submissions,
-            protocols,
-            scenes: Vec::new(),
-            lpips,
-            tool: tool.into(),
-            jobs: 1,
-            cache: None,
-            only_cached: false,
-            pictures: None,
-        }
-    }
-
-    /// Fails if this scorer cannot follow a protocol, or LPIPS has another network.
-    fn check(&self) -> Result<(), EvalError> {
-        self.protocols.iter().try_for_each(Protocol::check)?;
-        let (expected, found) = (LPIPS_NET.name(), self.lpips.network().map_or(LPIPS_NET, Lpips::net).name());
-        if expected == found { Ok(()) } else { Err(EvalError::LpipsNet { expected, found }) }
-    }
-
-    /// Fails where scores are missing that may not be computed, and names them all.
-    fn check_cached(&self, scenes: &[&SceneFile]) -> Result<(), EvalError> {
-        if !self.only_cached {
-            return Ok(());
-        }
-        let mut missing = Vec::new();
-        for path in &self.submissions {
-            let mut of_submission = Vec::new();
-            for scene in scenes {
-                let atlases = AtlasMeshes::on_demand(self.dataset, scene);
-                let prediction = read_scene(path, scene, &atlases)?;
-                let twins = Twins::read(self, path, scene, &atlases)?;
-                let constancy = |members: Vec<_>| self.recall::<Option<Constancy>>(&self.family_key(scene, &members));
-                let is_unknown = |members| constancy(members).is_none();
-                if self.read_cached(scene, &prediction).is_none() || twins.members(&prediction).is_some_and(is_unknown)
-                {
-                    of_submission.push(scene.id.clone());
-                }
-            }
-            if !of_submission.is_empty() {
-                missing.push((path.to_path_buf(), of_submission));
-            }
-        }
-        if missing.is_empty() { Ok(()) } else { Err(EvalError::NotCached { missing }) }
-    }
-
-    fn has(&self, track: Track) -> bool {
-        self.protocols.iter().any(|protocol| protocol.light.tracks.contains(&track))
-    }
-
+impl ScorePlan<'_> {
     /// The scores, and the scene that was opened for them.
     fn open_and_score(
         &self,
@@ -369,42 +252,10 @@ impl<'a> ScorePlan<'a> {
             reference: reference.as_ref(),
             renderer,
             pictures: pictures.as_ref(),
+            seen: self.seen,
             progress,
         })?;
         Ok((scores, open))
-    }
-
-    /// The key of a scene's constancy: everything that it depends on.
-    fn family_key(&self, scene: &SceneFile, members: &[&PredictedScene]) -> Key {
-        let answers: Vec<_> = members.iter().map(|member| (&member.files, &member.findings)).collect();
-        let of = ("constancy", &self.tool, &self.dataset.file.manifest_sha256, &scene.id, answers);
-        Key::of(json::to_text(&of).as_bytes())
-    }
-
-    /// The key of a scene's scores under a protocol: everything that they depend on.
-    fn score_key(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Key {
-        let weights = self.lpips.network().map(Lpips::sha256);
-        let file = &self.dataset.file;
-        let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], weights);
-        // A file that cannot be read has no hash, but may replace a map by its default; a finding states it.
-        let scored = (&self.tool, print, &prediction.files, &prediction.findings);
-        Key::of(json::to_text(&scored).as_bytes())
-    }
-
-    /// The scores that an earlier run wrote to the cache, if all of them can be read.
-    fn read_cached(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
-        self.protocols.iter().map(|protocol| self.recall(&self.score_key(scene, prediction, protocol))).collect()
-    }
-
-    /// An entry of the cache. A truncated or foreign file counts as missing.
-    fn recall<T: DeserializeOwned>(&self, key: &Key) -> Option<T> {
-        let cache = Cache::new(self.cache?);
-        json::parse(&cache.path(key), &cache.read(key, MOST_CACHED_BYTES).ok()??).ok()
-    }
-
-    fn keep(&self, key: &Key, found: &impl Serialize) -> Result<(), EvalError> {
-        let keep = |folder| Cache::new(folder).keep(key, json::to_text(found).as_bytes());
-        Ok(self.cache.map_or(Ok(()), keep)?)
     }
 }
 
@@ -412,10 +263,9 @@ impl<'a> ScorePlan<'a> {
 fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> {
     let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
     let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
-    let scores = |at: usize| task.protocols[at].scores(task.scene);
-    let scoring: Vec<usize> = (0..task.protocols.len()).filter(|at| scores(*at)).collect();
+    let scoring: Vec<usize> = (0..task.protocols.len()).filter(|&at| task.protocols[at].scores(task.scene)).collect();
     if !scoring.is_empty() && !task.scene.source.kind.states_materials() {
-        task.score_measured(&scores, &mut sheets)?;
+        task.score_measured(&scoring, &mut sheets)?;
         for &at in &scoring {
             if let Some(rules) = &task.protocols[at].photos {
                 score_photos(task, rules, at, &mut sheets)?;
@@ -423,13 +273,14 @@ fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> 
         }
     } else if !scoring.is_empty() {
         for part in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.over(set)) {
-            let wanted = |at: usize| scores(at) && (part.set == ViewSet::Turned || task.protocols[at].wide_views);
-            if !(0..task.protocols.len()).any(wanted) {
+            let has_views = |at: &usize| part.set == ViewSet::Turned || task.protocols[*at].wide_views;
+            let protocols: Vec<usize> = scoring.iter().copied().filter(has_views).collect();
+            if protocols.is_empty() {
                 continue;
             }
             let truths = part.truths()?;
-            let base_colors = part.score_materials(&truths, &wanted, &mut sheets)?;
-            for at in (0..task.protocols.len()).filter(|&at| wanted(at)) {
+            let base_colors = part.score_materials(&truths, &protocols, &mut sheets)?;
+            for at in protocols {
                 score_light(&part, &truths, &base_colors, at, &mut sheets)?;
             }
         }
@@ -442,99 +293,46 @@ fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, EvalError> 
     Ok(sheets.into_iter().map(|sheets| sheets.into_iter().map(finish).collect()).collect())
 }
 
-fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
-    let SubmissionJson { file, hashed } = SubmissionJson::read(path)?;
-    let mut findings = Vec::new();
-    let expected = &plan.dataset.file.manifest_sha256;
-    if file.dataset_manifest_sha256 != *expected {
-        findings.push(Finding::new(
-            Severity::Warning,
-            "other_dataset",
-            SUBMISSION,
-            "/dataset_manifest_sha256",
-            format!("made for the dataset {}, scored on {expected}", file.dataset_manifest_sha256),
-            "scored nevertheless; make the submission again for this dataset",
-        ));
-    }
-    let scores = vec![Vec::new(); plan.protocols.len()];
-    Ok(Entry { file, findings, files: vec![hashed], scores, constancy: Vec::new() })
-}
-
 fn finish(
     plan: &ScorePlan<'_>,
     scored: &[&SceneFile],
     tracer_check: Option<TracerCheck>,
-    mut entry: Entry,
+    mut submission: SubmissionScores,
 ) -> ResultFile {
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
     let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
-    for (protocol, scores) in plan.protocols.iter().zip(&entry.scores) {
-        for (scene, score) in scores.iter().filter(|(_, score)| score.not_finite > 0) {
-            let message =
-                format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite);
-            let action = "they count as no light; please report this submission";
-            let file = format!("scenes/{scene}");
-            entry.findings.push(Finding::new(Severity::Warning, "not_finite_light", file, "", message, action));
-        }
-    }
-    for scene in scored {
-        let without = plan.protocols.iter().filter(|protocol| !protocol.scores(scene));
-        let names: Vec<&str> = without.map(|protocol| protocol.name.as_str()).collect();
-        if !names.is_empty() {
-            let file = format!("scenes/{}/scene.json", scene.id);
-            let (message, action) = match scene.source.kind.states_materials() {
-                false => ("the scene is captured, so that its true materials are not known", "--protocol capture-1"),
-                true => ("the scene is not captured, so that no colour in it was measured", "another --protocol"),
-            };
-            let action = format!("has no value under '{}'; score it with {action}", names.join("', '"));
-            entry.findings.push(Finding::new(Severity::Note, "other_protocol", file, "/source/kind", message, action));
-        }
-    }
-    if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
-        let has_unknown_light = |scene: &&&SceneFile| scene.photo.is_some() && scene.source.kind.states_materials();
-        for scene in scored.iter().filter(has_unknown_light) {
-            let file = format!("scenes/{}/scene.json", scene.id);
-            let message = "the input picture is a photo from elsewhere, and the true light of the scene is not known";
-            let action = "scored its materials and not its light";
-            entry.findings.push(Finding::new(Severity::Note, "unknown_light", file, "/photo", message, action));
-        }
-    }
-    let not_predicted = not_predicted(&entry.files);
-    for map in &not_predicted {
-        let message = format!("the submission holds no {} of any scored instance", map.stem());
-        let action = "it has no value; under light it is rendered as the default";
-        entry.findings.push(Finding::new(Severity::Note, "not_predicted", SUBMISSION, "", message, action));
-    }
-    let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
+    let not_predicted = not_predicted(&submission.files);
+    submission.findings.extend(scoring_findings(plan, scored, &submission.scores, &not_predicted));
+    let protocols = plan.protocols.iter().zip(submission.scores).map(|(protocol, scores)| {
         let fingerprint = protocol.fingerprint(manifest, &ids, weights);
         (protocol.name.clone(), protocol_result(protocol, fingerprint, scores, &not_predicted))
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
     let missing = missing(plan, scored);
-    entry.findings.sort();
+    submission.findings.sort();
     ResultFile {
         format: RESULT_FORMAT.to_owned(),
         tool: plan.tool.clone(),
-        method: entry.file.method,
+        method: submission.file.method,
         submission: SubmissionId {
-            sha256: submission_sha256(&entry.files),
-            description: entry.file.description,
-            url: entry.file.url,
-            licence: entry.file.licence,
-            cost: entry.file.cost,
-            trained_on: entry.file.trained_on,
-            oracle: entry.file.oracle,
-            geometry: entry.file.geometry,
+            sha256: submission_sha256(&submission.files),
+            description: submission.file.description,
+            url: submission.file.url,
+            licence: submission.file.licence,
+            cost: submission.file.cost,
+            trained_on: submission.file.trained_on,
+            oracle: submission.file.oracle,
+            geometry: submission.file.geometry,
         },
         dataset: DatasetId::new(plan.dataset, scored.iter().copied()),
         lpips_weights: BTreeMap::from([(LPIPS_NET.name().to_owned(), weights.map(str::to_owned))]),
         protocols,
-        constancy: entry.constancy,
+        constancy: submission.constancy,
         not_predicted: not_predicted.iter().map(|map| map.stem().to_owned()).collect(),
         tracer_check,
         missing,
-        findings: entry.findings,
+        findings: submission.findings,
     }
 }
 
@@ -574,6 +372,192 @@ fn protocol_result(
         instances,
         measured,
     }
+}
+
+/// The findings that scoring adds to those of reading a submission: light that is not finite, scenes of another
+/// protocol, scenes of unknown light, and maps that are not predicted.
+fn scoring_findings(
+    plan: &ScorePlan<'_>,
+    scored: &[&SceneFile],
+    scores: &[Vec<(SceneId, SceneScore)>],
+    not_predicted: &[Map],
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (protocol, scores) in plan.protocols.iter().zip(scores) {
+        for (scene, score) in scores.iter().filter(|(_, score)| score.not_finite > 0) {
+            let message =
+                format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite);
+            let action = "they count as no light; please report this submission";
+            let file = format!("scenes/{scene}");
+            findings.push(Finding::new(Severity::Warning, "not_finite_light", file, "", message, action));
+        }
+    }
+    for scene in scored {
+        let without = plan.protocols.iter().filter(|protocol| !protocol.scores(scene));
+        let names: Vec<&str> = without.map(|protocol| protocol.name.as_str()).collect();
+        if !names.is_empty() {
+            let file = format!("scenes/{}/scene.json", scene.id);
+            let (message, action) = match scene.source.kind.states_materials() {
+                false => ("the scene is captured, so that its true materials are not known", "--protocol capture-1"),
+                true => ("the scene is not captured, so that no colour in it was measured", "another --protocol"),
+            };
+            let action = format!("has no value under '{}'; score it with {action}", names.join("', '"));
+            findings.push(Finding::new(Severity::Note, "other_protocol", file, "/source/kind", message, action));
+        }
+    }
+    if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
+        let has_unknown_light = |scene: &&&SceneFile| scene.photo.is_some() && scene.source.kind.states_materials();
+        for scene in scored.iter().filter(has_unknown_light) {
+            let file = format!("scenes/{}/scene.json", scene.id);
+            let message = "the input picture is a photo from elsewhere, and the true light of the scene is not known";
+            let action = "scored its materials and not its light";
+            findings.push(Finding::new(Severity::Note, "unknown_light", file, "/photo", message, action));
+        }
+    }
+    for map in not_predicted {
+        let message = format!("the submission holds no {} of any scored instance", map.stem());
+        let action = "it has no value; under light it is rendered as the default";
+        findings.push(Finding::new(Severity::Note, "not_predicted", SUBMISSION, "", message, action));
+    }
+    findings
+}
+
+impl<'a> ScorePlan<'a> {
+    /// All scenes, one after the other, without a cache.
+    pub fn new(
+        dataset: &'a Dataset,
+        submissions: Vec<&'a Path>,
+        protocols: Vec<Protocol>,
+        lpips: LpipsWeights,
+        tool: impl Into<String>,
+    ) -> Self {
+        Self {
+            dataset,
+            submissions,
+            protocols,
+            scenes: Vec::new(),
+            lpips,
+            tool: tool.into(),
+            jobs: 1,
+            cache: None,
+            only_cached: false,
+            pictures: None,
+            seen: None,
+        }
+    }
+
+    /// Fails if this scorer cannot follow a protocol, or LPIPS has another network.
+    fn check(&self) -> Result<(), EvalError> {
+        self.protocols.iter().try_for_each(Protocol::check)?;
+        let (expected, found) = (LPIPS_NET.name(), self.lpips.network().map_or(LPIPS_NET, Lpips::net).name());
+        if expected == found { Ok(()) } else { Err(EvalError::LpipsNet { expected, found }) }
+    }
+
+    /// Fails where scores are missing that may not be computed, and names them all.
+    fn check_cached(&self, scenes: &[&SceneFile]) -> Result<(), EvalError> {
+        if !self.only_cached {
+            return Ok(());
+        }
+        let mut missing = Vec::new();
+        for path in &self.submissions {
+            let mut of_submission = Vec::new();
+            for scene in scenes {
+                let atlases = AtlasMeshes::on_demand(self.dataset, scene);
+                let prediction = read_scene(path, scene, &atlases)?;
+                let twins = Twins::read(self.dataset, path, scene, &atlases)?;
+                let constancy = |members: Vec<_>| self.recall::<Option<Constancy>>(&self.family_key(scene, &members));
+                let is_unknown = |members| constancy(members).is_none();
+                if self.read_cached(scene, &prediction).is_none() || twins.members(&prediction).is_some_and(is_unknown)
+                {
+                    of_submission.push(scene.id.clone());
+                }
+            }
+            if !of_submission.is_empty() {
+                missing.push((path.to_path_buf(), of_submission));
+            }
+        }
+        if missing.is_empty() { Ok(()) } else { Err(EvalError::NotCached { missing }) }
+    }
+
+    fn has(&self, track: Track) -> bool {
+        self.protocols.iter().any(|protocol| protocol.light.tracks.contains(&track))
+    }
+
+    /// The constancy of a submission in the family of a scene, recalled or computed. Absent where [`Twins::members`]
+    /// are. The scene is opened if it is not yet.
+    fn constancy(
+        &self,
+        scene: &SceneFile,
+        prediction: &PredictedScene,
+        twins: &Twins,
+        open: &mut Option<OpenScene>,
+        progress: Progress<'_>,
+    ) -> Result<Option<Constancy>, EvalError> {
+        let Some(members) = twins.members(prediction) else { return Ok(None) };
+        let key = self.family_key(scene, &members);
+        if let Some(found) = self.recall(&key) {
+            return Ok(found);
+        }
+        let open = match open {
+            Some(open) => open,
+            none => none.insert(OpenScene::read(self.dataset, scene)?),
+        };
+        let lightings = twins.answers.iter().map(|(lighting, _)| *lighting).collect();
+        let found = Family { scene, lightings, members }.constancy(open, progress)?;
+        self.keep(&key, &found)?;
+        Ok(found)
+    }
+
+    /// The key of a scene's constancy: everything that it depends on.
+    fn family_key(&self, scene: &SceneFile, members: &[&PredictedScene]) -> Key {
+        let answers: Vec<_> = members.iter().map(|member| (&member.files, &member.findings)).collect();
+        let of = ("constancy", &self.tool, &self.dataset.file.manifest_sha256, &scene.id, answers);
+        Key::of(json::to_text(&of).as_bytes())
+    }
+
+    /// The key of a scene's scores under a protocol: everything that they depend on.
+    fn score_key(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Key {
+        let weights = self.lpips.network().map(Lpips::sha256);
+        let file = &self.dataset.file;
+        let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], weights);
+        // A file that cannot be read has no hash, but may replace a map by its default; a finding states it.
+        let scored = (&self.tool, print, &prediction.files, &prediction.findings);
+        Key::of(json::to_text(&scored).as_bytes())
+    }
+
+    /// The scores that an earlier run wrote to the cache, if all of them can be read.
+    fn read_cached(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
+        self.protocols.iter().map(|protocol| self.recall(&self.score_key(scene, prediction, protocol))).collect()
+    }
+
+    /// An entry of the cache. A truncated or foreign file counts as missing.
+    fn recall<T: DeserializeOwned>(&self, key: &Key) -> Option<T> {
+        let cache = Cache::new(self.cache?);
+        json::parse(&cache.path(key), &cache.read(key, MOST_CACHED_BYTES).ok()??).ok()
+    }
+
+    fn keep(&self, key: &Key, found: &impl Serialize) -> Result<(), EvalError> {
+        let keep = |folder| Cache::new(folder).keep(key, json::to_text(found).as_bytes());
+        Ok(self.cache.map_or(Ok(()), keep)?)
+    }
+}
+
+fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<SubmissionScores, EvalError> {
+    let SubmissionJson { file, hashed } = SubmissionJson::read(path)?;
+    let mut findings = Vec::new();
+    let expected = &plan.dataset.file.manifest_sha256;
+    if file.dataset_manifest_sha256 != *expected {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "other_dataset",
+            SUBMISSION,
+            "/dataset_manifest_sha256",
+            format!("made for the dataset {}, scored on {expected}", file.dataset_manifest_sha256),
+            "scored nevertheless; make the submission again for this dataset",
+        ));
+    }
+    let scores = vec![Vec::new(); plan.protocols.len()];
+    Ok(SubmissionScores { file, findings, files: vec![hashed], scores, constancy: Vec::new() })
 }
 
 /// Whether the dataset was rendered by the scorer, so that scenes of unknown light aside each has a reference.
@@ -617,7 +601,7 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
             Track::Fitted => plan.dataset.file.photo_renderer.is_some(),
             Track::True | Track::Relit => has_references(plan.dataset),
         };
-        let tracks = [Track::Fitted, Track::True, Track::Relit].into_iter().filter(|track| plan.has(*track));
+        let tracks = Track::ALL.iter().copied().filter(|track| plan.has(*track));
         missing.extend(tracks.filter(|track| !has_renders(track)).map(|track| MissingMetric {
             metric: MissingNumbers::Picture(track.picture()),
             reason: "the dataset has no renders to compare with".to_owned(),

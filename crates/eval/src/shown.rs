@@ -15,10 +15,9 @@ use crate::error::EvalError;
 use crate::light::reference::StoredReference;
 use crate::light::score::compare_under_lights;
 use crate::materials::pictures::{Places, material_pictures};
-use crate::open_scene::{OpenScene, ViewSet, scored_views};
 use crate::protocol::{Protocol, Track};
 use crate::scene::SceneTask;
-use crate::truth::ViewTruth;
+use crate::truth::{OpenScene, ViewSet, ViewTruth, scored_views};
 
 /// The truth and every submission's albedo of one view, linear.
 pub struct SceneAlbedo {
@@ -89,6 +88,7 @@ pub fn scene_light(
         reference: reference.as_ref(),
         renderer: dataset.photo_renderer(scene),
         pictures: None,
+        seen: None,
         progress,
     };
     let truths = task.truths()?;

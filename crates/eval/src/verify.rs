@@ -18,8 +18,7 @@ use crate::error::EvalError;
 use crate::metric::{LPIPS_NET, Metric};
 use crate::protocol::Protocol;
 use crate::result::key::ResultKey;
-use crate::result::means::{means, summary_noise};
-use crate::result::{MissingNumbers, RESULT_FORMAT, ResultFile};
+use crate::result::{MissingNumbers, RESULT_FORMAT, ResultFile, means, summary_noise};
 use crate::score::{LpipsWeights, ScorePlan, score};
 
 pub const VERIFICATION_FORMAT: &str = "mateval-verification/1";
@@ -162,7 +161,8 @@ fn obstacles(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>,
             LpipsWeights::Loaded(lpips) => {
                 let message = format!("made with weights {said}; those here are {}", lpips.sha256());
                 let action = "fetch the published weights: mateval fetch lpips";
-                findings.push(finding("other_weights", "/lpips_weights/alex", message, action));
+                let place = format!("/lpips_weights/{}", LPIPS_NET.name());
+                findings.push(finding("other_weights", &place, message, action));
             }
         }
     }

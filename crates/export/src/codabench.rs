@@ -57,28 +57,29 @@ pub struct Column {
 
 /// Writes the bundle as a folder, and returns the numbers of its scenes and tasks. Fails before anything is written where
 /// the dataset is not whole, no scene fits the limit, or the output exists; and where the truth is not complete.
-pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize), ExportError> {
-    if of.out.exists() {
-        return Err(ExportError::Exists { path: of.out.clone() });
+pub fn export(competition: &Competition, progress: Progress<'_>) -> Result<(usize, usize), ExportError> {
+    if competition.out.exists() {
+        return Err(ExportError::Exists { path: competition.out.clone() });
     }
-    for root in of.private.iter().chain([&of.dataset]) {
-        check_outside(&of.out, root, "--out")?;
+    for root in competition.private.iter().chain([&competition.dataset]) {
+        check_outside(&competition.out, root, "--out")?;
     }
-    let per_task = match of.seconds_a_scene {
-        Some(seconds) if seconds > of.limit => {
-            return Err(ExportError::SceneOverLimit { seconds, limit: of.limit });
+    let per_task = match competition.seconds_a_scene {
+        Some(seconds) if seconds > competition.limit => {
+            return Err(ExportError::SceneOverLimit { seconds, limit: competition.limit });
         }
-        Some(seconds) => (of.limit / seconds.max(1)) as usize,
+        Some(seconds) => (competition.limit / seconds.max(1)) as usize,
         None => usize::MAX,
     };
-    let SoundDataset { mut dataset, mut files } = SoundDataset::open(&of.dataset, Format::Croissant, progress)?;
+    let SoundDataset { mut dataset, mut files } =
+        SoundDataset::open(&competition.dataset, Format::Croissant, progress)?;
     // Tasks are slices of the scored scenes. The twins of a scene lie in its task.
     (dataset.twins, dataset.scenes) =
         dataset.scenes.into_iter().partition(|scene| dataset.file.twins.contains_key(&scene.id));
     // What a split withholds lies in its private folder, or with the rest.
-    let truth = of.private.as_ref().unwrap_or(&of.dataset);
+    let truth = competition.private.as_ref().unwrap_or(&competition.dataset);
     let mut withheld = Vec::new();
-    if of.private.is_some() {
+    if competition.private.is_some() {
         withheld = manifest::list_files(truth)?;
         withheld.retain(|file| file.starts_with("scenes/"));
     }
@@ -87,7 +88,7 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
     }
     files.extend([MANIFEST, DATASET].map(str::to_owned));
 
-    let work = WorkFolder::start(&of.out)?;
+    let work = WorkFolder::start(&competition.out)?;
     let out = work.path();
     let ids: Vec<&SceneId> = dataset.scenes.iter().map(|scene| &scene.id).collect();
     let slices: Vec<&[&SceneId]> = ids.chunks(per_task.min(ids.len().max(1))).collect();
@@ -98,14 +99,14 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
         let slice: Vec<SceneId> = slice.iter().cloned().chain(twins).collect();
         let belongs = |file: &&String| !file.starts_with("scenes/") || is_below(file, &slice);
         let reference = out.join(format!("data/reference_{at}"));
-        let public = files.iter().map(|file| (&of.dataset, file));
+        let public = files.iter().map(|file| (&competition.dataset, file));
         for (root, file) in public.chain(withheld.iter().map(|file| (truth, file))) {
             if belongs(&file) {
                 copy_file(&root.join(file), &reference.join(file))?;
             }
         }
         // They state errors of instances, so they lie with the truth and not with the program, which is public.
-        for (at, floor) in of.floors.iter().enumerate() {
+        for (at, floor) in competition.floors.iter().enumerate() {
             copy_file(floor, &reference.join(format!("floor_{at}.json")))?;
         }
         // Truth that is missing, or not that of this dataset, is found here.
@@ -114,12 +115,12 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
             return Err(DatasetError::Invalid { path: truth.clone(), findings }.into());
         }
     }
-    write_program(of, dataset.is_hidden(), &out.join("data/scoring_program"))?;
+    write_program(competition, dataset.is_hidden(), &out.join("data/scoring_program"))?;
     if let Some(shown) = dataset.scenes.first().and_then(|scene| shown_views(&dataset, scene).into_iter().next()) {
         copy_file(&dataset.root.join(shown.picture), &out.join("logo.png"))?;
     }
     let pages = [
-        ("overview.md", overview(of, &dataset)),
+        ("overview.md", overview(competition, &dataset)),
         ("submission.md", without_relative_links(SUBMISSION)),
         ("protocol.md", without_relative_links(PROTOCOL)),
         ("terms.md", terms(&dataset)),
@@ -127,21 +128,21 @@ pub fn export(of: &Competition, progress: Progress<'_>) -> Result<(usize, usize)
     for (file, text) in pages {
         write_file(&out.join("pages").join(file), text.as_bytes())?;
     }
-    write_file(&out.join("competition.yaml"), competition(of, &dataset, &slices).as_bytes())?;
+    write_file(&out.join("competition.yaml"), competition_yaml(competition, &dataset, &slices).as_bytes())?;
     work.finish()?;
     Ok((ids.len(), slices.len()))
 }
 
-fn write_program(of: &Competition, is_hidden: bool, out: &Path) -> Result<(), ExportError> {
+fn write_program(competition: &Competition, is_hidden: bool, out: &Path) -> Result<(), ExportError> {
     let numbers = if is_hidden { "rounded" } else { "whole" };
-    let columns: String = of.columns.iter().map(|column| format!("{}\n", column.key)).collect();
+    let columns: String = competition.columns.iter().map(|column| format!("{}\n", column.key)).collect();
     write_file(&out.join("metadata.yaml"), format!("command: sh /app/program/score.sh {numbers}\n").as_bytes())?;
     write_file(&out.join("score.sh"), SCORE.as_bytes())?;
     write_file(&out.join("columns.txt"), columns.as_bytes())
 }
 
 /// `competition.yaml`. Texts are written as JSON strings, which YAML reads as they are.
-fn competition(of: &Competition, dataset: &Dataset, slices: &[&[&SceneId]]) -> String {
+fn competition_yaml(competition: &Competition, dataset: &Dataset, slices: &[&[&SceneId]]) -> String {
     let quoted = |text: &str| Value::from(text).to_string();
     let is_hidden = dataset.is_hidden();
     let (mut tasks, mut indexes) = (String::new(), String::new());
@@ -158,7 +159,7 @@ fn competition(of: &Competition, dataset: &Dataset, slices: &[&[&SceneId]]) -> S
         let _ = writeln!(indexes, "      - {at}");
     }
     let mut columns = String::new();
-    for (index, column) in of.columns.iter().enumerate() {
+    for (index, column) in competition.columns.iter().enumerate() {
         let _ = write!(
             columns,
             "      - title: {}\n        key: {}\n        index: {index}\n        sorting: {}\n        precision: {}\n",
@@ -176,8 +177,8 @@ fn competition(of: &Competition, dataset: &Dataset, slices: &[&[&SceneId]]) -> S
         "phases:\n  - index: 0\n    name: Submissions\n    start: {} 00:00:00\n    execution_time_limit: {}\n    \
          max_submissions_per_day: {}\n    max_submissions: {most}\n    accepts_only_result_submissions: True\n    \
          hide_output: {hidden}\n    hide_score_output: {hidden}\n    tasks:\n{indexes}",
-        of.date.as_deref().unwrap_or("2000-01-01"),
-        of.limit,
+        competition.date.as_deref().unwrap_or("2000-01-01"),
+        competition.limit,
         if is_hidden { 1 } else { 5 },
         hidden = if is_hidden { "True" } else { "False" },
     );
@@ -189,7 +190,7 @@ fn competition(of: &Competition, dataset: &Dataset, slices: &[&[&SceneId]]) -> S
          submission_rule: \"Add_And_Delete_Multiple\"\n    columns:\n{columns}{FACT_SHEET}",
         quoted(&dataset.file.name),
         quoted("Materials of the objects of a room, from one photo and the room's geometry"),
-        quoted(&of.image),
+        quoted(&competition.image),
     )
 }
 
@@ -201,9 +202,9 @@ const FACT_SHEET: &str = r#"fact_sheet:
   cost: {"key": "cost", "type": "text", "title": "Seconds a scene, and the hardware", "selection": "", "is_required": "false", "is_on_leaderboard": "true"}
 "#;
 
-fn overview(of: &Competition, dataset: &Dataset) -> String {
+fn overview(competition: &Competition, dataset: &Dataset) -> String {
     let file = &dataset.file;
-    let place = match &of.url {
+    let place = match &competition.url {
         Some(url) => format!("Download the dataset from <{url}>."),
         None => "The organisers state where the dataset can be downloaded.".to_owned(),
     };

@@ -9,11 +9,12 @@ use std::path::Path;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::{Progress, ViewId};
+use mateval_files::source_folder::slashed;
 use mateval_files::untrusted::sha256_of_bytes;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::dataset::{ExportError, Exported, SoundDataset, licence_text, picture, slashed, write_file};
+use crate::dataset::{ExportError, Exported, SoundDataset, licence_text, picture, write_file};
 use crate::tars::{self, WrittenTar};
 
 /// The version of Croissant that the description follows.

@@ -11,6 +11,7 @@ use mateval_dataset::open::{Dataset, is_below};
 use mateval_dataset::{Camera, DatasetError, Progress, Report, SceneId, ViewId};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
+use mateval_files::work_folder::make_folder;
 
 /// A format that a dataset can be written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,11 +162,6 @@ pub fn picture(dataset: &Dataset, scene: &SceneFile, view: &View) -> Option<Path
     file.is_file().then_some(relative)
 }
 
-/// A path as files state it on every system, with forward slashes.
-pub fn slashed(path: &Path) -> String {
-    path.to_string_lossy().replace('\\', "/")
-}
-
 /// The views of a scene that have a picture, in its order.
 pub fn shown_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Vec<ShownView<'a>> {
     let shown = |view: &'a View| Some(ShownView { scene, view, picture: picture(dataset, scene, view)? });
@@ -216,5 +212,5 @@ pub(crate) fn copy_file(from: &Path, to: &Path) -> Result<(), ExportError> {
 /// Makes the folder that `path` lies in.
 pub(crate) fn make_folder_of(path: &Path) -> Result<(), ExportError> {
     let folder = path.parent().expect("an export writes below its own folder");
-    Ok(std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?)
+    Ok(make_folder(folder)?)
 }

@@ -10,6 +10,7 @@ use std::time::{Duration, SystemTime};
 use crate::error::FileError;
 use crate::untrusted::{read_at_most, sha256_of_bytes};
 use crate::whole::write_whole;
+use crate::work_folder::make_folder;
 
 /// The name of an entry: the SHA-256, hex, of everything that it depends on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,12 +64,12 @@ impl Cache {
 
     /// Keeps an entry, in place of one of the same key.
     pub fn keep(&self, key: &Key, bytes: &[u8]) -> Result<(), FileError> {
-        std::fs::create_dir_all(&self.folder).map_err(FileError::io("make", &self.folder))?;
+        make_folder(&self.folder)?;
         write_whole(&self.path(key), bytes)
     }
 
-    /// Removes what was not used for longest until all entries take at most `most_bytes`. An entry was last used when the
-    /// newest of its files was.
+    /// Removes what was not used for longest until all entries take at most `most_bytes`. An entry was last used when
+    /// the newest of its files was.
     pub fn keep_below(&self, most_bytes: u64) -> io::Result<()> {
         let mut entries = Vec::new();
         for entry in std::fs::read_dir(&self.folder)? {

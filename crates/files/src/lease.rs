@@ -13,8 +13,7 @@ use std::time::Duration;
 
 use crate::error::FileError;
 use crate::owner::Owner;
-use crate::whole;
-use crate::work_folder;
+use crate::{whole, work_folder};
 
 /// How often a holder gives a sign of life.
 const BEAT: Duration = Duration::from_secs(30);
@@ -93,7 +92,7 @@ fn write_over(path: &Path, text: &str) -> std::io::Result<()> {
 }
 
 /// Fails where a process holds the lease.
-fn check_free(path: &Path, what: &str) -> Result<(), FileError> {
+fn check_not_held(path: &Path, what: &str) -> Result<(), FileError> {
     // The claim comes first: it makes a network client look at the folder anew.
     Claim::new(path)?.check_lost(path, what)
 }
@@ -113,7 +112,7 @@ impl LeaseSet {
     /// The right to change a part. Fails where another process changes it or the whole.
     pub fn part(&self, name: &str) -> Result<Lease, FileError> {
         let lease = Lease::take(&self.file(name), &self.what(name))?;
-        check_free(&self.folder.join("whole"), self.whole)?;
+        check_not_held(&self.folder.join("whole"), self.whole)?;
         Ok(lease)
     }
 
@@ -127,7 +126,7 @@ impl LeaseSet {
         // Names with a dot are claims, or files of the file system's own.
         let found = found.filter(|name| !name.starts_with('.'));
         let names: BTreeSet<String> = known.into_iter().map(str::to_owned).chain(found).collect();
-        names.iter().try_for_each(|name| check_free(&self.file(name), &self.what(name)))?;
+        names.iter().try_for_each(|name| check_not_held(&self.file(name), &self.what(name)))?;
         Ok(lease)
     }
 
@@ -149,7 +148,7 @@ struct Claim {
 impl Claim {
     fn new(path: &Path) -> Result<Self, FileError> {
         let folder = path.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+        work_folder::make_folder(folder)?;
         let file = whole::beside(path).expect("a lease's file has a name");
         // Two leases of one process differ too.
         let text = format!("{}\n{}\n", Owner::this_process(), file.display());
@@ -245,9 +244,9 @@ mod tests {
         let own = Owner::this_process();
         let expected = format!("process {} on {} is at work on scene 'room'", own.process, own.host);
         assert!(text.starts_with(&expected) && text.contains("leases/room"), "{text}");
-        assert!(check_free(&path, "x").is_err());
+        assert!(check_not_held(&path, "x").is_err());
         drop(first);
-        check_free(&path, "x").unwrap();
+        check_not_held(&path, "x").unwrap();
         drop(Lease::take(&path, "scene 'room'").unwrap());
         assert_eq!(files(&path), 0);
     }

@@ -1,6 +1,6 @@
-//! The folder of a source: paths relative to it, since a dataset must not record the folders of the machine that made it;
-//! and the files in it that other files name, which are untrusted: names are made safe, files are read within limits and
-//! their hashes kept.
+//! The folder of a source: paths relative to it, since a dataset must not record the folders of the machine that made
+//! it; and the files in it that other files name, which are untrusted: names are made safe, files are read within
+//! limits and their hashes kept.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
@@ -211,6 +211,11 @@ fn stays_inside(path: &Path) -> bool {
     depth.is_some()
 }
 
+/// A path with forward slashes, as files state it on every system.
+pub fn slashed(path: &Path) -> String {
+    path.to_string_lossy().replace('\\', "/")
+}
+
 /// The deepest folder that contains all of these, with links resolved; absent if that is the root or a path is
 /// missing.
 pub fn common_folder<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<PathBuf> {
@@ -242,6 +247,11 @@ mod tests {
         for bad in ["../a", "a/../../b", "/etc/passwd", "C:\\a", "", "..", ".", "a/.."] {
             assert!(SourceFolder::relative(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn slashes_lean_forward() {
+        assert_eq!(slashed(Path::new("a\\b c/d.png")), "a/b c/d.png");
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! Input of unknown origin: files are read within limits, hashed, and named where they are something else than was
 //! expected; texts are made fit for a message.
+//!
+//! Messages use [`quoted`], or [`shortened`] where they set quotes themselves or must show that the text was cut. Pages
+//! and tables use [`shown`], which takes the length that they have room for.
 
 use std::borrow::Cow;
 use std::io::{Error, ErrorKind, Read as _};
@@ -33,8 +36,8 @@ pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
 /// The byte order mark that some editors put before UTF-8.
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Kinds of files that are found in place of others, by their first bytes: a name, and behind a semicolon what to do. The
-/// first that matches counts.
+/// Kinds of files that are found in place of others, by their first bytes: a name, and behind a semicolon what to do.
+/// The first that matches counts.
 const KINDS: [(&[u8], &str); 44] = [
     (b"version https://git-lfs.", "a Git LFS pointer in place of the file; run `git lfs pull` where it was cloned"),
     (b"\xff\xfe\0\0", "UTF-32 text; save it as UTF-8"),

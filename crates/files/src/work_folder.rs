@@ -33,6 +33,11 @@ pub fn check_holds_none(out: &Path, inputs: &[&Path]) -> Result<(), FileError> {
     }
 }
 
+/// Makes the folder and those above it that do not exist.
+pub fn make_folder(path: &Path) -> Result<(), FileError> {
+    std::fs::create_dir_all(path).map_err(FileError::io("make", path))
+}
+
 /// A folder that is filled beside its place. [`WorkFolder::finish`] moves it there, dropping it removes it.
 #[derive(Debug)]
 pub struct WorkFolder {
@@ -47,7 +52,7 @@ impl WorkFolder {
     pub fn start(place: &Path) -> Result<Self, FileError> {
         remove_abandoned(place)?;
         let work = beside(place)?;
-        std::fs::create_dir_all(&work).map_err(FileError::io("make", &work))?;
+        make_folder(&work)?;
         Ok(Self { place: place.to_owned(), work, replaces: place.exists() })
     }
 

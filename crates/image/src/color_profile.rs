@@ -22,6 +22,8 @@ const REC709_FROM_D50: [[f64; 3]; 3] = [
 ];
 /// sRGB's primaries and white, as cHRM states them.
 pub(crate) const REC709: [f64; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
+/// The largest difference of a chromaticity that counts as rounding.
+pub(crate) const CHROMATICITY_TOLERANCE: f64 = 0.01;
 /// Profiles within this of sRGB are sRGB: the difference of a third of a byte.
 const SAME: f64 = 1.5e-3;
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -290,7 +292,9 @@ fn check_png(info: &png::Info) -> Result<(), String> {
         [c.red.0, c.red.1, c.green.0, c.green.1, c.blue.0, c.blue.1, c.white.0, c.white.1]
             .map(|v| f64::from(v.into_value()))
     });
-    if let Some(found) = primaries.filter(|found| found.iter().zip(REC709).any(|(a, b)| (a - b).abs() > 0.01)) {
+    if let Some(found) =
+        primaries.filter(|found| found.iter().zip(REC709).any(|(a, b)| (a - b).abs() > CHROMATICITY_TOLERANCE))
+    {
         return Err(format!("its chunk cHRM states the primaries and white {found:?}; convert the photo to sRGB"));
     }
     Ok(())

@@ -13,10 +13,10 @@ use exr::meta::{BlockDescription, MetaData};
 use exr::prelude as ex;
 use exr::prelude::traits::*;
 use half::f16;
+use mateval_files::whole::write_whole;
 
 use crate::limits::{Malformed, check_size, read_file};
-use crate::{ImageError, LinearRgb, Normal, Picture};
-use mateval_files::whole::write_whole;
+use crate::{ImageError, LinearRgb, Normal, Picture, Texels, Texture, Wrap};
 
 /// Most samples of a layer in all channels together: one gibibyte as floats.
 const MAX_SAMPLES: usize = 1 << 28;
@@ -86,19 +86,23 @@ pub fn read_scalar(path: &Path) -> Result<Picture<f32>, ImageError> {
 }
 
 /// Channel `V` (or `Y`) from a file's bytes, without a check of its values.
-pub(crate) fn scalar_of_bytes(path: &Path, bytes: &[u8]) -> Result<Picture<f32>, ImageError> {
+fn scalar_of_bytes(path: &Path, bytes: &[u8]) -> Result<Picture<f32>, ImageError> {
     let layer = first_layer(path, bytes)?;
     let values = channel(path, &layer, "V").or_else(|error| channel(path, &layer, "Y").map_err(|_| error))?;
     Picture::new(layer.size.width(), layer.size.height(), values)
 }
 
-/// Width, height and the channels with these names from a file's bytes, without a check of their values.
-pub(crate) fn channels_of_bytes(
-    path: &Path,
-    bytes: &[u8],
-    names: [&str; 3],
-) -> Result<(usize, usize, [Vec<f32>; 3]), ImageError> {
-    planes(path, &first_layer(path, bytes)?, names)
+/// Channels `R`, `G`, `B` of an OpenEXR file, linear. Values may be NaN or infinite.
+pub fn exr_color(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
+    let (width, height, [r, g, b]) = planes(path, &first_layer(path, bytes)?, ["R", "G", "B"])?;
+    let texels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+    Texture::new(width, height, Texels::Linear(texels), Wrap::Clamp)
+}
+
+/// Channel `V` (or `Y`) of an OpenEXR file. Values may be NaN or infinite.
+pub fn exr_scalar(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
+    let picture = scalar_of_bytes(path, bytes)?;
+    Texture::new(picture.width(), picture.height(), Texels::Grey(picture.into_pixels()), Wrap::Clamp)
 }
 
 fn planes(path: &Path, layer: &FlatLayer, names: [&str; 3]) -> Result<(usize, usize, [Vec<f32>; 3]), ImageError> {

@@ -4,8 +4,8 @@
 //! typed pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for
 //! lookups ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
 //!
-//! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours between
-//! sRGB and linear.
+//! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours
+//! between sRGB and linear.
 
 mod color_profile;
 pub mod exr_io;

@@ -1,5 +1,5 @@
-//! The limits on the size of an untrusted picture, which are checked before memory is taken for it, and the error of this
-//! crate.
+//! The limits on the size of an untrusted picture, which are checked before memory is taken for it, and the error of
+//! this crate.
 
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,9 @@
 //! Reads untrusted NumPy files (`.npy`): pictures, as Python programs save the arrays of a network, and lists of whole
 //! numbers.
 //!
-//! Shapes of pictures: rows, columns (grey); rows, columns, channels; or channels, rows, columns, where the channels are
-//! 1, 3 or 4; leading axes of length 1 are dropped. Types: `u1` and `u2`, which count as the integers of a PNG, and the
-//! floats `f2`, `f4` and `f8`, which count as linear like those of an EXR.
+//! Shapes of pictures: rows, columns (grey); rows, columns, channels; or channels, rows, columns, where the channels
+//! are 1, 3 or 4; leading axes of length 1 are dropped. Types: `u1` and `u2`, which count as the integers of a PNG, and
+//! the floats `f2`, `f4` and `f8`, which count as linear like those of an EXR.
 //!
 //! The header is checked before the library parses it. The library takes memory for the header's stated length,
 //! recurses as deep as its brackets and multiplies the shape's numbers unchecked. The header is therefore compared with

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::color_profile::{Profile, REC709};
+use crate::color_profile::{CHROMATICITY_TOLERANCE, Profile, REC709};
 use crate::npy_io::NPY_SIGNATURE;
 use crate::texture_io::{Encoding, FewerBits, is_turned, texture_and_alpha_of_bytes, transparent_share};
 use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
@@ -144,14 +144,13 @@ fn other_radiance(bytes: &[u8]) -> Option<String> {
         ));
     }
     let primaries = stated("PRIMARIES").into_iter().next_back()?;
-    let is_rec709 = primaries.len() == 8 && !primaries.iter().zip(REC709).any(|(a, b)| differs(*a, b, MOST_OFF));
+    let is_rec709 =
+        primaries.len() == 8 && !primaries.iter().zip(REC709).any(|(a, b)| differs(*a, b, CHROMATICITY_TOLERANCE));
     (!is_rec709).then(|| format!("its header states PRIMARIES={primaries:?}; convert its colours to Rec. 709"))
 }
 
 /// The longest header of a Radiance HDR that is looked at, in bytes.
 const MOST_HEADER: usize = 1 << 16;
-/// The largest difference of a chromaticity that counts as rounding.
-const MOST_OFF: f64 = 0.01;
 
 /// The photo's linear colours by its profile; none for linear numbers, which no profile describes.
 fn converted(pixels: &Texture, profile: &Profile) -> Option<Result<Texture, ImageError>> {
@@ -203,7 +202,8 @@ mod tests {
         }
     }
 
-    /// Of a photo whose values are its coordinates, each pixel of the other camera's picture is the place that it shows.
+    /// Of a photo whose values are its coordinates, each pixel of the other camera's picture is the place that it
+    /// shows.
     #[test]
     fn resampling_looks_at_the_place_of_each_pixel() {
         let folder = tempfile::tempdir().unwrap();

@@ -9,11 +9,11 @@ use std::path::Path;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
+use mateval_files::whole::write_whole;
 
 use crate::limits::{Malformed, check_size, read_file};
 use crate::transfer::byte_from_unit;
-use crate::{ImageError, Mask, Picture, SrgbRgb};
-use mateval_files::whole::write_whole;
+use crate::{ImageError, Mask, Picture, SrgbRgb, Texels, Texture, Wrap};
 
 /// Writes 8-bit RGB, clipped to 0..1.
 pub fn write_srgb(path: &Path, picture: &Picture<SrgbRgb>) -> Result<(), ImageError> {
@@ -68,12 +68,7 @@ pub fn read_rgb_bytes(path: &Path) -> Result<Picture<[u8; 3]>, ImageError> {
     if raw.depth != png::BitDepth::Eight {
         return Err(raw.unexpected(path, "8-bit RGB"));
     }
-    let triple = |samples: &[u8]| match samples {
-        [r, g, b] | [r, g, b, _] => [*r, *g, *b],
-        [grey, ..] => [*grey; 3],
-        [] => [0; 3],
-    };
-    Picture::new(raw.width, raw.height, raw.data.chunks_exact(raw.color.samples()).map(triple).collect())
+    Picture::new(raw.width, raw.height, triples(&raw.data, raw.color.samples()))
 }
 
 /// Reads 16-bit grey as integers. Fails for any other kind.
@@ -99,8 +94,8 @@ pub fn read_mask(path: &Path) -> Result<Mask, ImageError> {
     Picture::new(raw.width, raw.height, raw.data.iter().map(|byte| *byte == 255).collect())
 }
 
-/// Reads 8- or 16-bit grey as whole numbers from the bytes of an untrusted file; `path` serves for errors only. A palette
-/// would hide which number is meant, so that such a file is refused like any other kind.
+/// Reads 8- or 16-bit grey as whole numbers from the bytes of an untrusted file; `path` serves for errors only. A
+/// palette would hide which number is meant, so that such a file is refused like any other kind.
 pub fn numbers_of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Picture<u16>, ImageError> {
     let raw = decode_bytes(path, bytes)?;
     let numbers = match (raw.color, raw.depth) {
@@ -142,16 +137,16 @@ pub fn grey_file(picture: &Picture<u8>) -> Result<Vec<u8>, String> {
 }
 
 /// A decoded PNG, with palettes and samples of fewer than eight bits expanded.
-pub(crate) struct Raw {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pub(crate) color: png::ColorType,
-    pub(crate) depth: png::BitDepth,
-    pub(crate) data: Vec<u8>,
+struct Raw {
+    width: usize,
+    height: usize,
+    color: png::ColorType,
+    depth: png::BitDepth,
+    data: Vec<u8>,
 }
 
 impl Raw {
-    pub(crate) fn words(&self) -> Vec<u16> {
+    fn words(&self) -> Vec<u16> {
         self.data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
     }
 
@@ -166,7 +161,7 @@ fn decode(path: &Path) -> Result<Raw, ImageError> {
 }
 
 /// Decodes a file's bytes. Text and profiles are skipped, since they may unpack to a thousand times their size.
-pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageError> {
+fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageError> {
     let invalid = |error: png::DecodingError| ImageError::invalid(path, format!("not a valid PNG: {error}"));
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -189,6 +184,41 @@ pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageErro
         depth: info.bit_depth,
         data,
     })
+}
+
+/// The sRGB colours of a PNG. Grey fills all three channels, alpha is dropped. `path` serves for errors only.
+pub fn png_color(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
+    let raw = decode_bytes(path, bytes)?;
+    let texels = if raw.depth == png::BitDepth::Sixteen {
+        Texels::Srgb16(triples(&raw.words(), raw.color.samples()))
+    } else {
+        Texels::Srgb8(triples(&raw.data, raw.color.samples()))
+    };
+    clamped(&raw, texels)
+}
+
+/// The first channel of a PNG, linear; kept as bytes if it has 8 bits, as floats if it has 16.
+pub fn png_scalar(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
+    let raw = decode_bytes(path, bytes)?;
+    let samples = raw.color.samples();
+    let texels = if raw.depth == png::BitDepth::Sixteen {
+        Texels::Grey(raw.words().iter().step_by(samples).map(|word| f32::from(*word) / 65535.0).collect())
+    } else {
+        Texels::Grey8(raw.data.iter().step_by(samples).copied().collect())
+    };
+    clamped(&raw, texels)
+}
+
+fn clamped(raw: &Raw, texels: Texels) -> Result<Texture, ImageError> {
+    Texture::new(raw.width, raw.height, texels, Wrap::Clamp)
+}
+
+fn triples<T: Copy>(samples: &[T], a_pixel: usize) -> Vec<[T; 3]> {
+    let triple = |pixel: &[T]| match *pixel {
+        [r, g, b] | [r, g, b, _] => [r, g, b],
+        _ => [pixel[0]; 3],
+    };
+    samples.chunks_exact(a_pixel).map(triple).collect()
 }
 
 /// The picture as a JPEG file of a quality of 1 to 100; none if it has no pixels or more than 65535 a side.

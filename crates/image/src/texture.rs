@@ -9,7 +9,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::transfer::{linear_from_srgb_byte, srgb_byte_table, srgb_word_table};
+use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_bytes, linear_from_srgb_words};
 
 /// How the integers of a file encode colours. Floats (EXR, HDR, NumPy) are always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,7 +122,7 @@ impl Texture {
         let at = y * self.width + x;
         match self.texels.as_ref() {
             Texels::Srgb8(v) => v[at].map(linear_from_srgb_byte),
-            Texels::Srgb16(v) => v[at].map(|word| srgb_word_table()[usize::from(word)]),
+            Texels::Srgb16(v) => v[at].map(|word| linear_from_srgb_words()[usize::from(word)]),
             Texels::Linear8(v) => v[at].map(|byte| f32::from(byte) / 255.0),
             Texels::Grey8(v) => [f32::from(v[at]) / 255.0; 3],
             Texels::Linear(v) => v[at],
@@ -135,6 +135,15 @@ impl Texture {
         (0..self.height).flat_map(move |y| (0..self.width).map(move |x| self.texel(x, y)))
     }
 
+    /// The mean of the linear values of all texels.
+    pub fn mean(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for texel in self.linear_texels() {
+            sum.iter_mut().zip(texel).for_each(|(sum, value)| *sum += f64::from(value));
+        }
+        sum.map(|sum| sum / (self.width * self.height) as f64)
+    }
+
     /// The linear value at `uv`, bilinear. A coordinate that is not finite or beyond 1e9 reads as 0.
     #[inline]
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
@@ -145,11 +154,11 @@ impl Texture {
         // The kind of texels is matched, and the table of the sRGB curve is found, once a lookup, not once a texel.
         match self.texels.as_ref() {
             Texels::Srgb8(v) => {
-                let linear = srgb_byte_table();
+                let linear = linear_from_srgb_bytes();
                 self.bilinear(uv, |at| v[at].map(|byte| linear[usize::from(byte)]))
             }
             Texels::Srgb16(v) => {
-                let linear = srgb_word_table();
+                let linear = linear_from_srgb_words();
                 self.bilinear(uv, |at| v[at].map(|word| linear[usize::from(word)]))
             }
             Texels::Linear8(v) => self.bilinear(uv, |at| v[at].map(|byte| f32::from(byte) / 255.0)),

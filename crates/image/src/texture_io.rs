@@ -7,15 +7,14 @@ use std::path::Path;
 
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
-
-use crate::exr_io::{self, channels_of_bytes, scalar_of_bytes};
-use crate::limits::{check_size, read_file};
-use crate::npy_io::{self, NPY_SIGNATURE};
-use crate::png_io::{Raw, decode_bytes};
-pub use crate::texture::Encoding;
-use crate::{ImageError, Texels, Texture, Wrap};
 use mateval_files::FileError;
 use mateval_files::untrusted::hint;
+
+use crate::exr_io::{self, EXR_SIGNATURE};
+use crate::limits::{check_size, read_file};
+use crate::npy_io::{self, NPY_SIGNATURE};
+pub use crate::texture::Encoding;
+use crate::{ImageError, Texels, Texture, Wrap};
 
 /// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
@@ -37,7 +36,7 @@ pub fn texture_and_alpha_of_bytes(
     encoding: Encoding,
     wrap: Wrap,
 ) -> Result<(Texture, Option<Texture>), ImageError> {
-    if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+    if bytes.starts_with(EXR_SIGNATURE) {
         let picture = exr_io::linear_or_grey_of_bytes(path, &bytes)?;
         let texels = Texels::Linear(picture.pixels().iter().map(|p| p.0).collect());
         return Ok((Texture::new(picture.width(), picture.height(), texels, wrap)?, None));
@@ -59,12 +58,8 @@ pub fn read_alpha(path: &Path, wrap: Wrap) -> Result<Option<Texture>, ImageError
     Ok(alpha)
 }
 
-/// Reads the values of a picture's file, 0 to 1 for one of bytes, and its alpha channel, if it has one.
-pub fn read_texture_and_alpha(path: &Path, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
-    read_with_alpha(path, Encoding::Linear, wrap)
-}
-
-fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
+/// Reads a texture and its alpha channel, if it has one.
+pub fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
     texture_and_alpha_of_bytes(path, read_file(path)?, encoding, wrap)
 }
 
@@ -82,8 +77,8 @@ pub fn transparent_share(alpha: &Texture) -> f64 {
     below as f64 / (alpha.width() * alpha.height()) as f64
 }
 
-/// What the largest of 16-bit integers of 8, 10 and 12 bits is; of 14 bits only the last is certain enough, since smaller
-/// ones are those of a dark picture.
+/// What the largest of 16-bit integers of 8, 10 and 12 bits is; of 14 bits only the last is certain enough, since
+/// smaller ones are those of a dark picture.
 const LARGEST_OF_BITS: [(u32, RangeInclusive<u16>); 4] =
     [(8, 128..=255), (10, 512..=1023), (12, 2048..=4095), (14, 16383..=16383)];
 
@@ -181,54 +176,6 @@ fn color_texels(path: &Path, decoded: DynamicImage, encoding: Encoding) -> Resul
         return Err(ImageError::invalid(path, what));
     }
     Ok(texels)
-}
-
-/// The sRGB colours of a PNG. Grey fills all three channels, alpha is dropped. `path` serves for errors only.
-pub fn png_color(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
-    let raw = decode_bytes(path, bytes)?;
-    let texels = if raw.depth == png::BitDepth::Sixteen {
-        Texels::Srgb16(triples(&raw.words(), raw.color.samples()))
-    } else {
-        Texels::Srgb8(triples(&raw.data, raw.color.samples()))
-    };
-    clamped(&raw, texels)
-}
-
-/// The first channel of a PNG, linear; kept as bytes if it has 8 bits, as floats if it has 16.
-pub fn png_scalar(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
-    let raw = decode_bytes(path, bytes)?;
-    let samples = raw.color.samples();
-    let texels = if raw.depth == png::BitDepth::Sixteen {
-        Texels::Grey(raw.words().iter().step_by(samples).map(|word| f32::from(*word) / 65535.0).collect())
-    } else {
-        Texels::Grey8(raw.data.iter().step_by(samples).copied().collect())
-    };
-    clamped(&raw, texels)
-}
-
-/// Channels `R`, `G`, `B` of an OpenEXR file, linear. Values may be NaN or infinite.
-pub fn exr_color(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
-    let (width, height, [r, g, b]) = channels_of_bytes(path, bytes, ["R", "G", "B"])?;
-    let texels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-    Texture::new(width, height, Texels::Linear(texels), Wrap::Clamp)
-}
-
-/// Channel `V` (or `Y`) of an OpenEXR file. Values may be NaN or infinite.
-pub fn exr_scalar(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
-    let picture = scalar_of_bytes(path, bytes)?;
-    Texture::new(picture.width(), picture.height(), Texels::Grey(picture.into_pixels()), Wrap::Clamp)
-}
-
-fn clamped(raw: &Raw, texels: Texels) -> Result<Texture, ImageError> {
-    Texture::new(raw.width, raw.height, texels, Wrap::Clamp)
-}
-
-fn triples<T: Copy>(samples: &[T], a_pixel: usize) -> Vec<[T; 3]> {
-    let triple = |pixel: &[T]| match *pixel {
-        [r, g, b] | [r, g, b, _] => [r, g, b],
-        _ => [pixel[0]; 3],
-    };
-    samples.chunks_exact(a_pixel).map(triple).collect()
 }
 
 #[cfg(test)]
@@ -382,8 +329,8 @@ mod tests {
             let bytes = std::fs::read(&path).unwrap();
             let [srgb, linear] =
                 [Encoding::Srgb, Encoding::Linear].map(|encoding| read_texture(&path, encoding, Wrap::Clamp).unwrap());
-            assert_eq!(png_color(&path, bytes.clone()).unwrap(), srgb, "{at}");
-            let scalar = png_scalar(&path, bytes).unwrap();
+            assert_eq!(png_io::png_color(&path, bytes.clone()).unwrap(), srgb, "{at}");
+            let scalar = png_io::png_scalar(&path, bytes).unwrap();
             for (x, y) in (0..3).flat_map(|y| (0..5).map(move |x| (x, y))) {
                 assert_eq!(scalar.texel(x, y), [linear.texel(x, y)[0]; 3], "{at}");
             }

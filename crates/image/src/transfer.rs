@@ -25,7 +25,7 @@ static LINEAR_FROM_BYTE: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
 
 /// The linear value of every sRGB byte, indexed by the byte.
-pub(crate) fn srgb_byte_table() -> &'static [f32; 256] {
+pub(crate) fn linear_from_srgb_bytes() -> &'static [f32; 256] {
     &LINEAR_FROM_BYTE
 }
 
@@ -38,7 +38,7 @@ static LINEAR_FROM_WORD: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|word| linear_from_srgb(f32::from(word) / 65535.0)).collect());
 
 /// The linear value of every sRGB-encoded 16-bit word, indexed by the word.
-pub(crate) fn srgb_word_table() -> &'static [f32] {
+pub(crate) fn linear_from_srgb_words() -> &'static [f32] {
     &LINEAR_FROM_WORD
 }
 
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn words_are_finer_than_bytes() {
         let value = 0.893_289;
-        let word = srgb_word_table()[usize::from(word_from_unit(srgb_from_linear(value)))];
+        let word = linear_from_srgb_words()[usize::from(word_from_unit(srgb_from_linear(value)))];
         let byte = linear_from_srgb_byte(byte_from_unit(srgb_from_linear(value)));
         assert!((word - value).abs() < 2e-5 && (byte - value).abs() > 1e-3);
     }

@@ -1,4 +1,4 @@
-//! What may glow in a room, from its public files.
+//! Possible lights of a room whose lamps are unknown, from its public files.
 //!
 //! In: `scene.json`, the surfaces of the room and the instance that each belongs to, and which instances glow in a
 //! picture. Out: light groups of radiance 1: one for each light fixture and each instance that glows, one for all

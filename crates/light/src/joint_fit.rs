@@ -54,6 +54,12 @@ const SHOWN_PRIOR: f64 = 50.0;
 const STEPS: u32 = 40;
 /// The least light I - G of a square, as a share of I.
 const LEAST_DIFFUSE: f64 = 0.05;
+/// The least radiance of a channel that is shown, as a share of the brightest one.
+const DARK: f64 = 1e-3;
+/// Damping at which no step is worth trying.
+const MOST_DAMPING: f64 = 1e9;
+/// The gain, as a share of the objective, below which the fit has ended.
+const LEAST_GAIN: f64 = 1e-7;
 
 /// What is fitted to. All pictures have one size.
 #[derive(Clone, Copy, Debug)]
@@ -177,13 +183,6 @@ struct Problem<'a> {
     parts: usize,
     rows: Vec<Row>,
 }
-
-/// The least radiance of a channel that is shown, as a share of the brightest one.
-const DARK: f64 = 1e-3;
-/// Damping at which no step is worth trying.
-const MOST_DAMPING: f64 = 1e9;
-/// The gain, as a share of the objective, below which the fit has ended.
-const LEAST_GAIN: f64 = 1e-7;
 
 impl Problem<'_> {
     fn solve(&self) -> Vec<f64> {

@@ -232,13 +232,6 @@ pub fn fit_two_streams(
     Ok(TwoStreamFit { streams: [fit_lights(rules, bases[0], target)?, fit_lights(rules, bases[1], target)?] })
 }
 
-/// Averages over squares of [`FitRules::pool`] pixels, by channel. Pixels outside the mask or the picture count as
-/// black, so that every pixel has the same weight.
-pub fn pooled(rules: &FitRules, picture: &Picture<LinearRgb>, mask: Option<&Mask>) -> [Vec<f64>; 3] {
-    let counts = |x, y| mask.is_none_or(|mask| mask.get(x, y));
-    [0, 1, 2].map(|channel| averages(rules, picture, channel, counts))
-}
-
 /// The squares of a photo in one channel: first those of pixels that are not clipped, then those of pixels that are.
 /// Squares that no pixel counts in are left out.
 struct Rows<'a> {
@@ -293,7 +286,8 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Averages of one channel over squares of pixels; pixels that do not count are black.
+/// Averages of one channel over squares of [`FitRules::pool`] pixels. Pixels that do not count or lie outside the
+/// picture are black, so that every pixel has the same weight.
 fn averages(
     rules: &FitRules,
     picture: &Picture<LinearRgb>,
@@ -423,7 +417,7 @@ mod tests {
     #[test]
     fn squares_are_averaged_and_edges_count_by_area() {
         let picture = Picture::from_fn(12, 8, |x, y| LinearRgb([(x + y) as f32, 1.0, 0.0]));
-        let [red, green, blue] = pooled(&rules(), &picture, None);
+        let [red, green, blue] = [0, 1, 2].map(|channel| averages(&rules(), &picture, channel, |_, _| true));
         assert_eq!((red[0], &green[..], &blue[..]), (7.0, &[1.0, 0.5][..], &[0.0, 0.0][..]));
     }
 

@@ -1,4 +1,5 @@
-//! Comparing photos of a real room with renders of its scan: the pixels that can be compared, and the exposure of a photo.
+//! Comparing photos of a real room with renders of its scan: the pixels that can be compared, and the exposure of a
+//! photo.
 //!
 //! A clipped pixel states only the least radiance. Beside an edge of depth, a scan that is off by a pixel shows another
 //! surface than the photo does.

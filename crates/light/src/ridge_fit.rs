@@ -11,7 +11,8 @@
 //! = C^T y. The inner minimum lies at x_e = max(0, 1 + g_e / 2w). So a dual certifies the answer: anybody can check it
 //! with two products.
 //!
-//! Only +, -, *, / and square roots of f64 in a fixed order: the same bytes on every machine.
+//! Only +, -, *, / and square roots of f64 in a fixed order: the same bytes on every machine. The Cholesky solver also
+//! serves `joint_fit`.
 
 /// What is fitted: columns and a target of one length.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,7 +147,7 @@ struct Direction {
     y: Vec<f64>,
 }
 
-/// What the products of each pair of a variable and its multiplier shall become, less what they are.
+/// For each pair of a variable and its multiplier: the target of their product minus its value.
 struct Aims {
     r: Vec<f64>,
     u: Vec<f64>,

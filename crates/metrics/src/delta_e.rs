@@ -14,8 +14,7 @@ use palette::{Lab, LinSrgb};
 use rayon::prelude::*;
 
 use crate::MetricError;
-use crate::pixel::check_pair;
-use crate::pixel::pixel_count;
+use crate::pixel::{check_pair, pixel_count};
 
 /// The mean CIEDE2000 difference over the pixels of the mask, between colours clipped to 0..1 and seen under D65.
 ///

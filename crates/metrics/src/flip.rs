@@ -19,8 +19,7 @@ use mateval_image::{Mask, Picture, SrgbRgb};
 use rayon::prelude::*;
 
 use crate::MetricError;
-use crate::pixel::reference_filled;
-use crate::pixel::{check_finite, check_pair, check_sizes};
+use crate::pixel::{check_pair, reference_filled};
 
 /// Pixels per degree of the observer's view: a monitor of 3840 pixels on 0.7 metres, seen from 0.7 metres, which is the
 /// default of `flip-evaluator`.
@@ -86,9 +85,7 @@ pub fn flip(
 /// # Ok::<(), mateval_metrics::MetricError>(())
 /// ```
 pub fn flip_map(prediction: &Picture<SrgbRgb>, reference: &Picture<SrgbRgb>) -> Result<Picture<f32>, MetricError> {
-    check_sizes(prediction, reference, None)?;
-    check_finite("prediction", prediction, None)?;
-    check_finite("reference", reference, None)?;
+    check_pair(prediction, reference, None)?;
     if prediction.pixels().is_empty() {
         // No edge pixel to repeat.
         return Ok(Picture::filled(prediction.width(), prediction.height(), 0.0));

@@ -1,4 +1,4 @@
-//! What metrics whose windows look across a mask's edge do outside the mask: the one place where mask rules differ.
+//! Mask rules: how SSIM and LPIPS, whose windows reach across a mask's edge, treat the pixels outside.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

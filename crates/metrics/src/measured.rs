@@ -1,4 +1,5 @@
-//! Scores of regions whose colour was measured: MAW's two numbers as its board has them, and CIEDE2000 without any scale.
+//! Scores of regions whose colour was measured: MAW's two numbers as its board has them, and CIEDE2000 without any
+//! scale.
 //!
 //! MAW (Wu et al., "Measured Albedo in the Wild", ICCP 2023; MeasuredAlbedo/code, `numerical_albedo.py`) sees a
 //! prediction as an 8-bit sRGB picture of 320x240 pixels, which Pillow has made of it, and a region as the mean of its
@@ -39,13 +40,13 @@ fn lab(color: [f64; 3]) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// CIEDE2000 of two linear colours, which are clipped to at most 1.
-pub fn color_difference(a: [f64; 3], b: [f64; 3]) -> f64 {
+/// CIEDE2000 of two linear colours, which are clipped to at most 1. Not [`crate::color_difference`]: another Lab.
+pub fn measured_difference(a: [f64; 3], b: [f64; 3]) -> f64 {
     ciede2000(lab(a), lab(b))
 }
 
-/// CIEDE2000 of two colours of CIE Lab (Sharma, Wu and Dalal 2005, "The CIEDE2000 color-difference formula", equations 2
-/// to 22, with all parametric factors 1). The one of `palette`, with which albedo pictures are compared, has rounded
+/// CIEDE2000 of two colours of CIE Lab (Sharma, Wu and Dalal 2005, "The CIEDE2000 color-difference formula", equations
+/// 2 to 22, with all parametric factors 1). The one of `palette`, with which albedo pictures are compared, has rounded
 /// constants.
 fn ciede2000([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
     let seventh = |chroma: f64| {
@@ -79,18 +80,18 @@ fn ciede2000([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
 /// The mean CIEDE2000 over regions between predicted and measured colour, without any scale. Regions count alike,
 /// however large they are: each is one measurement. `None` without regions.
 pub fn region_delta_e(regions: &[RegionColors]) -> Option<f64> {
-    let sum: f64 = regions.iter().map(|region| color_difference(region.predicted, region.measured)).sum();
+    let sum: f64 = regions.iter().map(|region| measured_difference(region.predicted, region.measured)).sum();
     (!regions.is_empty()).then(|| sum / regions.len() as f64)
 }
 
-/// How far the measured colour may be from the true one: CIEDE2000 for one standard error of each channel, whose squares
-/// are summed. Each is the mean of both directions.
+/// How far the measured colour may be from the true one: CIEDE2000 for one standard error of each channel, whose
+/// squares are summed. Each is the mean of both directions.
 pub fn measurement_delta_e(measured: [f64; 3], standard_error: [f64; 3]) -> f64 {
     let along = |channel: usize| {
         let moved = |sign: f64| {
             let mut moved = measured;
             moved[channel] = (moved[channel] + sign * standard_error[channel]).clamp(0.0, 1.0);
-            color_difference(moved, measured)
+            measured_difference(moved, measured)
         };
         (moved(1.0) + moved(-1.0)) / 2.0
     };
@@ -125,7 +126,7 @@ pub fn maw_chromaticity(regions: &[RegionColors]) -> Option<f64> {
     weighted(regions, |region| {
         let (p, m) = (grey(region.predicted), grey(region.measured));
         let scale = p * m / (p * p).max(MAW_LEAST);
-        color_difference(region.predicted.map(|value| scale * value), region.measured)
+        measured_difference(region.predicted.map(|value| scale * value), region.measured)
     })
 }
 
@@ -280,8 +281,8 @@ mod tests {
         values.fold(0, |sum: u32, value| sum.wrapping_mul(31).wrapping_add(value))
     }
 
-    /// Sizes, and checksums of what Pillow 13 makes of the same bytes, by the same script: enlarged, reduced, and reduced
-    /// along rows alone.
+    /// Sizes, and checksums of what Pillow 13 makes of the same bytes, by the same script: enlarged, reduced, and
+    /// reduced along rows alone.
     #[test]
     fn pictures_have_pillows_bytes() {
         let pinned: [((usize, usize), u32, u32); 3] = [
@@ -305,7 +306,7 @@ mod tests {
     #[test]
     fn the_measurements_error_is_a_distance() {
         let (measured, moved) = ([0.5, 0.4, 0.3], [[0.51, 0.4, 0.3], [0.49, 0.4, 0.3]]);
-        let expected = moved.map(|moved| color_difference(moved, measured)).iter().sum::<f64>() / 2.0;
+        let expected = moved.map(|moved| measured_difference(moved, measured)).iter().sum::<f64>() / 2.0;
         assert!((measurement_delta_e(measured, [0.01, 0.0, 0.0]) - expected).abs() < 1e-12);
         assert_eq!(measurement_delta_e(measured, [0.0; 3]), 0.0);
         assert!(measurement_delta_e(measured, [0.01; 3]) > expected);

@@ -54,19 +54,6 @@ pub enum PrepError {
         "scene '{scene}' has no ground truth, without which its pictures cannot be made again; add its ground_truth/"
     )]
     NoTruth { scene: SceneId },
-    #[error("list '{}': {source}", path.display())]
-    List {
-        path: PathBuf,
-        /// What is wrong with it, and where.
-        source: csv::Error,
-    },
-    #[error("list '{}': the lists have more than {most} rows in total", path.display())]
-    LongLists {
-        /// The file that exceeds the limit.
-        path: PathBuf,
-        /// The largest number of rows of all lists together.
-        most: usize,
-    },
     /// A house that was named alone is none of the survey's.
     #[error(
         "'{name}' is none of the survey's {houses} houses; name one by its file relative to --source, or by the file's name"

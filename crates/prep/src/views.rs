@@ -8,7 +8,7 @@ use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::material::Appearance;
 use mateval_dataset::reference::{Emission, ReferenceScene, SurfaceIndex};
 use mateval_dataset::{Camera, ViewId};
-use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, png_io};
 use mateval_tracer::World;
@@ -282,7 +282,7 @@ pub(crate) fn write_views(
         note_nearest(&geometry, &mut nearest[usize::from(at > 0)]);
         unseen_shares.push(unseen_share(&geometry));
         let shown = folder.view(&view.id);
-        std::fs::create_dir_all(&shown).map_err(FileError::io("make", &shown))?;
+        make_folder(&shown)?;
         write_geometry(&shown, &view.id, &geometry)?;
         write_parts(&shown, &geometry, parts)?;
         each(at, &geometry, &truth)?;
@@ -305,7 +305,7 @@ fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
 /// The share of the valid pixels that the input view does not show.
 fn unseen_share(geometry: &GeometryPictures) -> f64 {
     let count = |mask: &Mask| mask.pixels().iter().filter(|&&holds| holds).count() as f64;
-    // No valid pixel, none unseen.
+    // Without valid pixels the share is 0.
     count(&geometry.unobserved) / count(&geometry.valid).max(1.0)
 }
 

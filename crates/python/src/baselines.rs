@@ -23,7 +23,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{MapInput, plane, triples};
 use crate::dataset::Scene;
-use crate::instance::SceneSource;
+use crate::instance::SharedScene;
 use crate::long_work::{Listener, failed, run_long, shown_in_notebook};
 
 /// The maps of an instance, encoded as a submission stores them.
@@ -138,7 +138,7 @@ fn options(neighbours: u8, normal_weight_m: f64, any_instance: bool, atlas_size:
 
 /// The maps by the instance's place in the scene.
 fn lifted(
-    source: &SceneSource,
+    source: &SharedScene,
     estimate: &Estimate,
     options: &NnOptions,
     progress: Progress<'_>,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open;
 use mateval_eval::protocol::Protocol;
@@ -18,7 +19,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyIterator, PyList, PyType};
 
 use crate::arrays::triples;
-use crate::instance::{Instance, Part, SceneSource};
+use crate::instance::{Instance, Part, SharedScene};
 use crate::long_work::{Listener, failed, run_long, shown_in_notebook, unknown_id};
 use crate::view::View;
 
@@ -84,7 +85,7 @@ impl Dataset {
 
     fn __getitem__(&self, key: &str) -> PyResult<Scene> {
         let at = scene_place(&self.0, key)?;
-        Ok(Scene::new(SceneSource::new(Arc::clone(&self.0), at)))
+        Ok(Scene::new(SharedScene::new(Arc::clone(&self.0), at)))
     }
 
     fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
@@ -112,21 +113,16 @@ pub fn scene_place(dataset: &open::Dataset, id: &str) -> PyResult<usize> {
                 "scene '{id}' is listed in '{root}/dataset.json', but its folder is not there: unpack 'scenes/{id}.tar' in '{root}'"
             ));
         }
-        let known = quoted(dataset.scenes.iter().map(|scene| scene.id.as_str()));
+        let known = quoted(&dataset.scenes.iter().map(|scene| &scene.id).collect::<Vec<_>>());
         unknown_id(format!("'{root}' has no scene '{id}'; it has {known}"))
     })
-}
-
-/// `'a', 'b'`.
-pub fn quoted<'a>(ids: impl Iterator<Item = &'a str>) -> String {
-    ids.map(|id| format!("'{id}'")).collect::<Vec<_>>().join(", ")
 }
 
 /// A scene of a dataset.
 #[pyclass(frozen, module = "mateval")]
 pub struct Scene {
     /// What it shares with its views and instances.
-    pub source: Arc<SceneSource>,
+    pub source: Arc<SharedScene>,
     instances: PyOnceLock<Py<PyAny>>,
     parts: PyOnceLock<Py<PyAny>>,
     views: PyOnceLock<Py<PyAny>>,
@@ -134,7 +130,7 @@ pub struct Scene {
 
 impl Scene {
     /// A scene whose instances, parts and views are not made yet.
-    pub fn new(source: SceneSource) -> Self {
+    pub fn new(source: SharedScene) -> Self {
         let (instances, parts, views) = (PyOnceLock::new(), PyOnceLock::new(), PyOnceLock::new());
         Self { source: Arc::new(source), instances, parts, views }
     }
@@ -273,7 +269,7 @@ pub fn render<'py>(
     if !(1..=4096).contains(&samples) {
         return Err(PyValueError::new_err(format!("samples: expected 1 to 4096, found {samples}")));
     }
-    let mut protocol = Protocol::named("mateval-3").map_err(failed)?;
+    let mut protocol = Protocol::named(Protocol::DEFAULT).map_err(failed)?;
     protocol.light.samples.each_half = samples;
     let listener = Listener::of(py, progress)?;
     let source = Arc::clone(&scene.source);

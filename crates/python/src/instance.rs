@@ -16,7 +16,7 @@ use crate::long_work::failed;
 /// One object that methods provide textures for.
 #[pyclass(frozen, module = "mateval")]
 pub struct Instance {
-    source: Arc<SceneSource>,
+    source: Arc<SharedScene>,
     at: usize,
     /// Its id: its folder in a submission.
     #[pyo3(get)]
@@ -47,7 +47,7 @@ pub struct Instance {
 
 impl Instance {
     /// The instance at this place of the scene, which must exist.
-    pub fn new(source: &Arc<SceneSource>, at: usize) -> Self {
+    pub fn new(source: &Arc<SharedScene>, at: usize) -> Self {
         let file = &source.file().instances[at];
         Self {
             source: Arc::clone(source),
@@ -166,7 +166,7 @@ impl Mesh {
 }
 
 /// A scene and the dataset that it belongs to.
-pub struct SceneSource {
+pub struct SharedScene {
     pub dataset: Arc<open::Dataset>,
     /// The scene's place in the dataset.
     at: usize,
@@ -174,7 +174,7 @@ pub struct SceneSource {
     meshes: OnceLock<Vec<Arc<TriangleMesh>>>,
 }
 
-impl SceneSource {
+impl SharedScene {
     /// The scene at this place of the dataset, which must exist.
     pub fn new(dataset: Arc<open::Dataset>, at: usize) -> Self {
         Self { dataset, at, meshes: OnceLock::new() }

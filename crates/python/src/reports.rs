@@ -158,6 +158,7 @@ impl ScoreTask {
             cache: self.cache.as_deref(),
             only_cached: false,
             pictures: None,
+            seen: None,
         };
         let results = mateval_eval::score::score(&plan, progress).context("cannot score")?;
         Ok(results.iter().map(json::to_lines).collect())

@@ -5,13 +5,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use mateval_baselines::submission::check_out;
 use mateval_dataset::dataset::Instance;
+use mateval_dataset::ids::quoted;
 use mateval_dataset::open::Dataset as OpenDataset;
 use mateval_dataset::submission::{
     Cost, MAP_SIZES, Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, instance_folder,
 };
 use mateval_dataset::{DatasetError, SceneId, json};
-use mateval_files::FileError;
-use mateval_files::work_folder::WorkFolder;
+use mateval_files::work_folder::{WorkFolder, make_folder};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, png_io};
 use mateval_submission::map_file::{BASE_COLOR_RANGE, SCALAR_RANGE};
@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{MapInput, Numbers};
-use crate::dataset::{opened, quoted, scene_place};
+use crate::dataset::{opened, scene_place};
 use crate::long_work::{failed, unknown_id};
 
 /// Writes a submission. Its folder appears when the `with` block ends without an exception, or when `close` is called;
@@ -118,7 +118,7 @@ impl Submission {
         }
         drop(open);
         py.detach(|| {
-            std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+            make_folder(&folder)?;
             files.iter().try_for_each(MapFile::write).map_err(DatasetError::from)
         })
         .map_err(failed)
@@ -190,7 +190,7 @@ impl Submission {
     fn find(&self, scene: &str, instance: &str) -> PyResult<(&SceneId, &Instance)> {
         let file = &self.dataset.scenes[scene_place(&self.dataset, scene)?];
         let Some(found) = file.instances.iter().find(|file| file.id.as_str() == instance) else {
-            let known = quoted(file.instances.iter().map(|file| file.id.as_str()));
+            let known = quoted(&file.instances.iter().map(|file| &file.id).collect::<Vec<_>>());
             return Err(unknown_id(format!("scene '{scene}' has no instance '{instance}'; it has {known}")));
         };
         if found.atlas.is_none() {

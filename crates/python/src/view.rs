@@ -16,13 +16,13 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{plane, read_picture, rows, triples};
-use crate::instance::SceneSource;
+use crate::instance::SharedScene;
 use crate::long_work::{failed, shown_in_notebook, withheld};
 
 /// A view of a scene. Its pictures are read from their files at each access.
 #[pyclass(frozen, module = "mateval")]
 pub struct View {
-    pub source: Arc<SceneSource>,
+    pub source: Arc<SharedScene>,
     /// Its place in the scene, which must exist.
     pub at: usize,
 }
@@ -180,7 +180,7 @@ impl View {
 /// are not valid too: use `View.valid`.
 #[pyclass(frozen, module = "mateval")]
 pub struct Truth {
-    source: Arc<SceneSource>,
+    source: Arc<SharedScene>,
     at: usize,
 }
 

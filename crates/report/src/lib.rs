@@ -6,8 +6,8 @@
 //! votes on a site's pictures ([`votes`]). Results that contradict each other, or what they are shown with, are refused
 //! with every reason ([`error`]).
 //!
-//! Of a dataset that is released, [`publish`] makes a public and a private copy, and [`release`] a page that describes
-//! it and can be cited.
+//! Of a dataset that is released, [`publish`] makes a public and a private copy, [`rounded`] the numbers of a hidden
+//! split that may be shown, and [`release`] a page that describes it and can be cited.
 
 pub mod error;
 pub mod explain;

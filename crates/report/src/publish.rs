@@ -17,7 +17,7 @@ use mateval_dataset::{DatasetError, Progress, Report, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_files::whole::{write_private, write_whole};
-use mateval_files::work_folder::{WorkFolder, check_holds_none};
+use mateval_files::work_folder::{WorkFolder, check_holds_none, make_folder};
 use mateval_prep::recipe::RECIPE;
 
 use crate::error::ReportError;
@@ -51,8 +51,7 @@ pub fn publish(
     open_book: bool,
     progress: Progress<'_>,
 ) -> Result<Published, ReportError> {
-    // Everything that can fail.
-    // Twins have files to withhold, too.
+    // Refuse before anything is written. Twins have files to withhold, too.
     let dataset = Dataset::open(root)?.with_twins();
     dataset.check_whole()?;
     [public, private].into_iter().try_for_each(|out| check_holds_none(out, &[root]))?;
@@ -136,7 +135,7 @@ fn copy(from: &Path, to: &Path, entries: &[Entry], progress: &dyn Fn(usize)) -> 
 fn copy_file(from: &Path, file: &str, to: &Path, name: &str) -> Result<(), ReportError> {
     let place = to.join(name);
     if let Some(folder) = place.parent() {
-        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+        make_folder(folder)?;
     }
     std::fs::copy(from.join(file), &place).map_err(FileError::io("write", &place))?;
     Ok(())

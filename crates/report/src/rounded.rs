@@ -5,7 +5,7 @@
 //! rounded one has no scene, instance or picture, and no digit that is finer than the number's own error. Rounded means
 //! over a split still solve for one colour, that of all its rooms: so a number is stated only where it is better than that
 //! of the floors, results of baselines that anybody can make from the public files. This is the Ladder mechanism (Blum and
-//! Hardt, ICML 2015) from a public start: submissions below it, such as constants, are told nothing apart.
+//! Hardt, ICML 2015) from a public start: the numbers shown do not distinguish submissions below it, such as constants.
 
 use std::collections::BTreeMap;
 

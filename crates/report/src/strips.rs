@@ -10,10 +10,9 @@ use mateval_eval::metric::PictureKind;
 use mateval_eval::protocol::{Protocol, Track};
 use mateval_eval::shown::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
-use mateval_files::FileError;
-use mateval_files::work_folder::check_free;
+use mateval_files::work_folder::{check_free, make_folder};
 use mateval_image::transfer::byte_from_unit;
-use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, png_io};
 
 use crate::error::ReportError;
 
@@ -109,7 +108,7 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
     if jobs.len() < chosen.len() * plan.shown.len() {
         progress(Report::Message("scenes with a photo from elsewhere have no pictures of light, which is not known"));
     }
-    std::fs::create_dir_all(plan.out).map_err(FileError::io("make", plan.out))?;
+    make_folder(plan.out)?;
     let mut written = Vec::new();
     for (done, &(scene, shown)) in jobs.iter().enumerate() {
         progress(Report::step("pictures", done, jobs.len()));
@@ -182,15 +181,19 @@ fn darkened(truth: &ViewTruth, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
 /// The error map of each submission.
 pub(crate) fn errors(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
     let Some((reference, predicted)) = row.compared.split_first() else { return Vec::new() };
-    let error = |picture: &Picture<[f32; 3]>| {
-        Picture::from_fn(picture.width(), picture.height(), |x, y| {
-            if !row.truth.valid.get(x, y) {
-                return [0; 3];
-            }
-            error_color(picture.get(x, y), reference.get(x, y))
-        })
-    };
-    predicted.iter().map(error).collect()
+    predicted.iter().map(|picture| error_map(picture, reference, &row.truth.valid)).collect()
+}
+
+/// The errors of a picture; invalid pixels are black.
+pub(crate) fn error_map(
+    prediction: &Picture<[f32; 3]>,
+    reference: &Picture<[f32; 3]>,
+    valid: &Mask,
+) -> Picture<[u8; 3]> {
+    Picture::from_fn(prediction.width(), prediction.height(), |x, y| match valid.get(x, y) {
+        true => error_color(prediction.get(x, y), reference.get(x, y)),
+        false => [0; 3],
+    })
 }
 
 /// The colour of a pixel's error.
@@ -232,7 +235,7 @@ pub(crate) fn grid(rows: &[Vec<Picture<[u8; 3]>>]) -> Picture<[u8; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use mateval_image::{Mask, Normal};
+    use mateval_image::Normal;
 
     use super::*;
 

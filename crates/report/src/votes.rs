@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::progress::{Table, row};
 use mateval_dataset::{Finding, SceneId, Severity, json};
+use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
 use mateval_files::untrusted::shortened;
@@ -188,7 +189,7 @@ pub fn preferences(
     if files.is_empty() && !findings.is_empty() {
         return Err(ReportError::UnfitVotes(findings));
     }
-    let protocol = files.first().map_or("mateval-3", |(_, file)| &file.protocol);
+    let protocol = files.first().map_or(Protocol::DEFAULT, |(_, file)| &file.protocol);
     let ranking = rank(results, protocol, partial)?;
     let mut sittings: BTreeMap<&str, &Path> = BTreeMap::new();
     let mut voters: BTreeMap<&str, Tally> = BTreeMap::new();

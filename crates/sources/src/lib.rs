@@ -15,7 +15,7 @@ pub mod blend;
 pub mod capture;
 mod coincident;
 #[cfg(test)]
-mod fallbacks;
+mod fallback_tests;
 pub mod front3d;
 pub mod gltf;
 mod log;

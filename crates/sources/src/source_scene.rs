@@ -84,8 +84,8 @@ pub struct FileScene {
     pub origins: Vec<InstanceOrigin>,
     /// Whether the file has lights of its own.
     pub lights: SceneLights,
-    /// The first camera that can be used; a Mitsuba scene always has one. glTF states no picture size: it has 480
-    /// columns.
+    /// The first camera that can be used; a Mitsuba scene always has one. glTF states no picture size: a glTF's
+    /// camera gets 480 columns.
     pub camera: Option<Camera>,
     /// Width over height that a glTF's camera states, where it does.
     pub aspect: Option<f64>,

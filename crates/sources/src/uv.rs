@@ -115,7 +115,7 @@ impl Means {
     fn texture(&mut self, scene: &mut ReferenceScene, index: TextureIndex) -> TextureIndex {
         *self.textures.entry(index).or_insert_with(|| {
             let SourceTexture { name, texture, .. } = &scene.textures[index.0];
-            let mean = mean_color(texture).map(|value| value as f32);
+            let mean = texture.mean().map(|value| value as f32);
             let texels = match texture.texels() {
                 Texels::Grey(_) => Texels::Grey(vec![mean[0]]),
                 _ => Texels::Linear(vec![mean]),
@@ -148,7 +148,7 @@ impl Means {
             && let Emission::Area { radiance, map, .. } = &mut scene.lights[light].emission
             && let Some(lost) = map.take()
         {
-            let mean = mean_color(&scene.textures[lost.texture.0].texture);
+            let mean = scene.textures[lost.texture.0].texture.mean();
             *radiance = std::array::from_fn(|channel| radiance[channel] * mean[channel] as f32);
         }
     }
@@ -183,15 +183,6 @@ impl Means {
         }
         self.flatten(scene, new.0);
     }
-}
-
-/// The mean colour of a texture's texels, summed in f64.
-pub(crate) fn mean_color(texture: &Texture) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for texel in texture.linear_texels() {
-        sum.iter_mut().zip(texel).for_each(|(s, v)| *s += f64::from(v));
-    }
-    sum.map(|s| s / (texture.width() * texture.height()) as f64)
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 use std::sync::OnceLock;
 
+use fixedbitset::FixedBitSet;
 use glam::{DVec2, DVec3};
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
@@ -202,7 +203,7 @@ fn add_near(reach: &mut TexelSet, corners: [DVec2; 3], far: f64) {
             continue;
         }
         let columns = near(part.corners().iter().map(|corner| corner.x), far, width);
-        reach.add_run(y * width + columns.start()..y * width + columns.end() + 1);
+        reach.texels.insert_range(y * width + columns.start()..y * width + columns.end() + 1);
     }
 }
 
@@ -219,17 +220,17 @@ fn near(along: impl Iterator<Item = f64>, far: f64, size: usize) -> std::ops::Ra
 pub(crate) struct TexelSet {
     width: usize,
     height: usize,
-    words: Vec<u64>,
+    pub(crate) texels: FixedBitSet,
 }
 
 impl TexelSet {
     pub(crate) fn none(width: usize, height: usize) -> Self {
-        Self { width, height, words: vec![0; (width * height).div_ceil(64)] }
+        Self { width, height, texels: FixedBitSet::with_capacity(width * height) }
     }
 
     pub(crate) fn all(width: usize, height: usize) -> Self {
         let mut all = Self::none(width, height);
-        all.add_run(0..width * height);
+        all.texels.insert_range(..);
         all
     }
 
@@ -239,36 +240,6 @@ impl TexelSet {
 
     pub(crate) fn height(&self) -> usize {
         self.height
-    }
-
-    pub(crate) fn count(&self) -> usize {
-        self.words.iter().map(|word| word.count_ones() as usize).sum()
-    }
-
-    pub(crate) fn holds(&self, at: usize) -> bool {
-        self.words[at / 64] >> (at % 64) & 1 == 1
-    }
-
-    /// Adds consecutive texels, a word at a time.
-    pub(crate) fn add_run(&mut self, run: std::ops::Range<usize>) {
-        let mut at = run.start;
-        while at < run.end {
-            let count = (64 - at % 64).min(run.end - at);
-            self.words[at / 64] |= (u64::MAX >> (64 - count)) << (at % 64);
-            at += count;
-        }
-    }
-
-    pub(crate) fn remove(&mut self, at: usize) {
-        self.words[at / 64] &= !(1 << (at % 64));
-    }
-
-    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.words.iter().enumerate().flat_map(|(word, bits)| {
-            let after = |bits: &u64| Some(bits & bits.wrapping_sub(1)).filter(|bits| *bits != 0);
-            let states = std::iter::successors(Some(*bits).filter(|bits| *bits != 0), after);
-            states.map(move |bits| 64 * word + bits.trailing_zeros() as usize)
-        })
     }
 
     /// The up to eight texels of the map around texel `at`, in order.
@@ -418,7 +389,7 @@ mod tests {
     #[test]
     fn a_footprint_is_at_least_two_by_two_texels() {
         let at = |x: f32, y: f32| Vec2::new(x / 16.0, 1.0 - y / 16.0);
-        let texels = |corners: [Vec2; 3]| reached(&mesh(corners.into()), 16, 16).iter().collect::<Vec<_>>();
+        let texels = |corners: [Vec2; 3]| reached(&mesh(corners.into()), 16, 16).texels.ones().collect::<Vec<_>>();
         let inner = [at(3.7, 5.7), at(4.2, 5.8), at(4.0, 6.2)];
         assert_eq!(texels(inner), [5 * 16 + 3, 5 * 16 + 4, 6 * 16 + 3, 6 * 16 + 4]);
         let rows = |rows: std::ops::RangeInclusive<usize>| rows.flat_map(|y| [3, 4, 5].map(|x| y * 16 + x)).collect();
@@ -441,7 +412,7 @@ mod tests {
             let chart = (7..=16).contains(&y) && ((7..=16).contains(&x) || (23..=32).contains(&x));
             chart || ((39..=40).contains(&y) && (39..=50).contains(&x))
         };
-        assert!((0..64 * 64).all(|at| reach.holds(at) == expected(at % 64, at / 64)));
+        assert!((0..64 * 64).all(|at| reach.texels.contains(at) == expected(at % 64, at / 64)));
     }
 
     #[test]
@@ -474,7 +445,7 @@ mod tests {
                 _ => {}
             }
             let reach = reached(&mesh(uvs.clone()), size, size);
-            let value = |at: usize| if reach.holds(at) { 0.5 } else { f32::NAN };
+            let value = |at: usize| if reach.texels.contains(at) { 0.5 } else { f32::NAN };
             let texels = Texels::Grey((0..size * size).map(value).collect());
             let texture = Texture::new(size, size, texels, Wrap::Clamp).unwrap();
             let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
@@ -484,20 +455,6 @@ mod tests {
                 prop_assert_eq!(texture.sample(uv.to_array()), [0.5; 3]);
             }
         }
-    }
-
-    #[test]
-    fn runs_are_the_texels_that_were_added() {
-        for run in [0..0, 0..1, 63..64, 63..65, 5..200, 128..192, 0..221, 220..221] {
-            let mut set = TexelSet::none(17, 13);
-            set.add_run(run.clone());
-            assert_eq!(set.iter().collect::<Vec<_>>(), run.clone().collect::<Vec<_>>());
-            assert_eq!(set.count(), run.len());
-            assert!((0..221).all(|at| set.holds(at) == run.contains(&at)), "{run:?}");
-        }
-        let mut all = TexelSet::all(17, 13);
-        all.remove(64);
-        assert!(!all.holds(64) && all.count() == 220 && all.iter().all(|at| at != 64));
     }
 
     #[test]

@@ -14,6 +14,7 @@ use mateval_dataset::open::Dataset;
 use mateval_dataset::submission::{MAX_SUBMISSION_BYTES, Map, SUBMISSION, SubmissionFile, instance_folder};
 use mateval_dataset::{InstanceId, SceneId};
 use mateval_files::FileError;
+use mateval_files::source_folder::slashed;
 use mateval_files::untrusted::{read_at_most, sha256_of_bytes};
 use serde::Serialize;
 
@@ -66,9 +67,35 @@ impl SubmittedFile {
     }
 }
 
+/// The instance that maps belong to, in one submission.
+#[derive(Clone, Copy)]
+pub(crate) struct MapFolder<'a> {
+    pub(crate) submission: &'a Path,
+    pub(crate) scene: &'a SceneId,
+    pub(crate) instance: &'a InstanceId,
+}
+
+impl MapFolder<'_> {
+    /// The two places of a map: as PNG, as EXR.
+    pub(crate) fn candidates(&self, map: Map) -> [PathBuf; 2] {
+        let folder = instance_folder(self.submission, self.scene, self.instance);
+        ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending))
+    }
+
+    /// Those of the two that exist.
+    pub(crate) fn present(&self, map: Map) -> Vec<PathBuf> {
+        self.candidates(map).into_iter().filter(|path| exists(path)).collect()
+    }
+
+    /// The file of a map.
+    pub(crate) fn read(&self, path: &Path) -> Result<SubmittedFile, FileFault> {
+        SubmittedFile::read(self.submission, path, MAX_MAP_BYTES)
+    }
+}
+
 /// A path relative to the submission's folder, with forward slashes.
 pub(crate) fn relative(submission: &Path, path: &Path) -> String {
-    path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/")
+    slashed(path.strip_prefix(submission).unwrap_or(path))
 }
 
 /// Where a file lies once links are followed. Fails where that is outside the submission's folder, or no ordinary file.
@@ -106,27 +133,6 @@ impl SubmissionJson {
         let source = SubmittedFile::read(submission, &path, MAX_SUBMISSION_BYTES)
             .map_err(|fault| SubmissionError::File { path: path.clone(), fault })?;
         Ok(Self { file: SubmissionFile::parse(&path, &source.bytes)?, hashed: source.hashed })
-    }
-}
-
-/// The instance that maps belong to, in one submission.
-#[derive(Clone, Copy)]
-pub(crate) struct MapFolder<'a> {
-    pub(crate) submission: &'a Path,
-    pub(crate) scene: &'a SceneId,
-    pub(crate) instance: &'a InstanceId,
-}
-
-impl MapFolder<'_> {
-    /// The two places of a map: as PNG, as EXR.
-    pub(crate) fn candidates(&self, map: Map) -> [PathBuf; 2] {
-        let folder = instance_folder(self.submission, self.scene, self.instance);
-        ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending))
-    }
-
-    /// Those of the two that exist.
-    pub(crate) fn present(&self, map: Map) -> Vec<PathBuf> {
-        self.candidates(map).into_iter().filter(|path| exists(path)).collect()
     }
 }
 
@@ -184,10 +190,10 @@ pub fn hashed_submission(
 /// The maps of a scene in the order in which scoring reads them; those that cannot be read have no hash.
 fn map_hashes(submission: &Path, scene: &SceneFile) -> Vec<HashedFile> {
     let with_atlas = scene.instances.iter().filter(|instance| instance.atlas.is_some());
-    let paths = with_atlas.flat_map(|instance| {
+    let read = with_atlas.flat_map(|instance| {
         let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
-        Map::ALL.into_iter().flat_map(move |map| folder.present(map))
+        let paths = Map::ALL.into_iter().flat_map(move |map| folder.present(map));
+        paths.filter_map(move |path| folder.read(&path).ok())
     });
-    let read = paths.filter_map(|path| SubmittedFile::read(submission, &path, MAX_MAP_BYTES).ok());
     read.map(|file| file.hashed).collect()
 }

@@ -7,12 +7,12 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use mateval_dataset::submission::{GREY, MAP_SIZES, Map};
+use mateval_dataset::submission::{GREY, MAP_SIZES, MISSING_METALLIC, MISSING_ROUGHNESS, Map};
 use mateval_dataset::{DatasetError, TriangleMesh};
 use mateval_files::untrusted::{is_lfs_pointer, kind_name, shortened};
-use mateval_image::exr_io::{EXR_SIGNATURE, ExrHeader};
-use mateval_image::png_io::{PNG_SIGNATURE, PngHeader};
-use mateval_image::{ImageError, Texels, Texture, texture_io};
+use mateval_image::exr_io::{self, EXR_SIGNATURE, ExrHeader};
+use mateval_image::png_io::{self, PNG_SIGNATURE, PngHeader};
+use mateval_image::{ImageError, Texels, Texture};
 
 use crate::atlas::{TexelSet, reached};
 use crate::error::FileFault;
@@ -30,12 +30,6 @@ pub const SCALAR_RANGE: RangeInclusive<f32> = 0.0..=1.0;
 
 /// The largest share of the reached texels that may be bad; a map with more of them is unsound.
 pub const MOST_BAD_SHARE: f64 = 0.01;
-
-/// The perceptual roughness that replaces a missing map.
-pub const MISSING_ROUGHNESS: f32 = 0.5;
-
-/// The metallic that replaces a missing map.
-pub const MISSING_METALLIC: f32 = 0.0;
 
 /// The linear value of the map that replaces a missing one, in all channels.
 pub fn default_value(map: Map) -> f32 {
@@ -180,10 +174,10 @@ fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), FileFault> {
 
 fn texels(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<Texture, FileFault> {
     let decoded = match (header, map) {
-        (MapHeader::Png(_), Map::BaseColor) => texture_io::png_color(path, bytes),
-        (MapHeader::Png(_), _) => texture_io::png_scalar(path, bytes),
-        (MapHeader::Exr(_), Map::BaseColor) => texture_io::exr_color(path, &bytes),
-        (MapHeader::Exr(_), _) => texture_io::exr_scalar(path, &bytes),
+        (MapHeader::Png(_), Map::BaseColor) => png_io::png_color(path, bytes),
+        (MapHeader::Png(_), _) => png_io::png_scalar(path, bytes),
+        (MapHeader::Exr(_), Map::BaseColor) => exr_io::exr_color(path, &bytes),
+        (MapHeader::Exr(_), _) => exr_io::exr_scalar(path, &bytes),
     };
     decoded.map_err(|error| {
         let what = match error {
@@ -266,20 +260,20 @@ impl Numbers<'_> {
 /// finding about those in `reach`, none if there are none; fails where there are too many.
 fn repair(numbers: &mut Numbers<'_>, map: Map, reach: TexelSet) -> Result<Option<FileFault>, FileFault> {
     let range = range_of(map);
-    let (width, reached) = (reach.width(), reach.count());
+    let (width, reached) = (reach.width(), reach.texels.count_ones(..));
     let (mut bad, mut sound) = (TexelSet::none(width, reach.height()), reach);
     let mut first = None;
     for at in 0..numbers.values.len() / numbers.channels {
         let Some(value) = numbers.texel(at).iter().copied().find(|value| !range.contains(value)) else { continue };
-        if sound.holds(at) {
+        if sound.texels.contains(at) {
             first = first.or(Some((at, value)));
-            sound.remove(at);
-            bad.add_run(at..at + 1);
+            sound.texels.remove(at);
+            bad.texels.insert(at);
         }
         numbers.set(at, [default_value(map); 3]);
     }
     let Some((at, value)) = first else { return Ok(None) };
-    let count = bad.count();
+    let count = bad.texels.count_ones(..);
     let found = BadTexels { map, count, reached, place: [at % width, at / width], value };
     if count as f64 / reached as f64 > MOST_BAD_SHARE {
         return Err(found.too_many());
@@ -294,16 +288,17 @@ fn repair(numbers: &mut Numbers<'_>, map: Map, reach: TexelSet) -> Result<Option
 /// Each texel is visited once as a member of a round and once for each neighbour, so that the work is linear whatever
 /// the shape of the bad area.
 fn fill_from_neighbours(numbers: &mut Numbers<'_>, mut bad: TexelSet, mut sound: TexelSet) {
-    let mut round: Vec<usize> = bad.iter().filter(|at| sound.neighbours(*at).any(|other| sound.holds(other))).collect();
+    let touches_sound = |at: &usize| sound.neighbours(*at).any(|other| sound.texels.contains(other));
+    let mut round: Vec<usize> = bad.texels.ones().filter(touches_sound).collect();
     while !round.is_empty() {
-        let means: Vec<[f32; 3]> =
-            round.iter().map(|at| numbers.mean(sound.neighbours(*at).filter(|other| sound.holds(*other)))).collect();
+        let sound_around = |at: &usize| sound.neighbours(*at).filter(|other| sound.texels.contains(*other));
+        let means: Vec<[f32; 3]> = round.iter().map(|at| numbers.mean(sound_around(at))).collect();
         for (at, mean) in round.iter().zip(means) {
             numbers.set(*at, mean);
-            bad.remove(*at);
-            sound.add_run(*at..at + 1);
+            bad.texels.remove(*at);
+            sound.texels.insert(*at);
         }
-        round = round.iter().flat_map(|at| bad.neighbours(*at)).filter(|at| bad.holds(*at)).collect();
+        round = round.iter().flat_map(|at| bad.neighbours(*at)).filter(|at| bad.texels.contains(*at)).collect();
         round.sort_unstable();
         round.dedup();
     }

@@ -13,11 +13,14 @@ use mateval_image::{Texels, Texture, Wrap};
 
 use crate::atlas::AtlasMeshes;
 use crate::error::{FileFault, finding};
-use crate::files::{HashedFile, MAX_MAP_BYTES, MapFolder, SubmittedFile, relative};
+use crate::files::{HashedFile, MapFolder, SubmittedFile, relative};
 use crate::map_file::{self, MapFile, default_value};
 
 /// Most bytes that the texels of a scene's maps may take in memory together.
 pub const MAX_SCENE_BYTES: usize = 8 << 30;
+
+/// The code of a finding about a base colour that a submission lacks.
+pub const MISSING_MAP: &str = "missing_map";
 
 /// One instance's maps. A map with the same value everywhere has one texel.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,8 +59,8 @@ pub struct PredictedScene {
 }
 
 /// Reads, hashes and decodes the maps of one scene, each file once. `atlases` are the scene's; a submission without bad
-/// texels does not need them. Whatever is wrong with the submission is a finding; this fails only where they cannot be
-/// read.
+/// texels does not need them. Every fault of the submission is a finding; the call fails only where the atlases cannot
+/// be read.
 pub fn read_scene(
     submission: &Path,
     scene: &SceneFile,
@@ -98,16 +101,16 @@ impl Reader<'_> {
         let folder = MapFolder { submission: self.submission, scene, instance };
         let present = folder.present(map);
         let fault = match present.as_slice() {
-            [path] => match self.decoded(path, at, map)? {
+            [path] => match self.decoded(folder, path, at, map)? {
                 Ok(texture) => return Ok(texture),
                 Err(finding) => *finding,
             },
             // Roughness and metallic are optional.
             [] if map != Map::BaseColor => return Ok(one_texel(default_value(map))),
-            [] => self.replaced("missing_map", &folder.candidates(map)[0], map, "expected a PNG or an EXR, found none"),
+            [] => self.replaced(MISSING_MAP, &folder.candidates(map)[0], map, "expected a PNG or an EXR, found none"),
             several => {
                 // Neither is scored, but both belong to the submission's hash. An unreadable one has no hash.
-                several.iter().for_each(|path| drop(self.read(path)));
+                several.iter().for_each(|path| drop(self.read(folder, path)));
                 let message = "found both a PNG and an EXR; expected one of them";
                 self.replaced("ambiguous_map", &several[0], map, message)
             }
@@ -117,9 +120,15 @@ impl Reader<'_> {
     }
 
     /// The map of a file, or the finding that it is replaced. Fails only where the atlas cannot be read.
-    fn decoded(&mut self, path: &Path, at: usize, map: Map) -> Result<Result<Texture, Box<Finding>>, DatasetError> {
+    fn decoded(
+        &mut self,
+        folder: MapFolder<'_>,
+        path: &Path,
+        at: usize,
+        map: Map,
+    ) -> Result<Result<Texture, Box<Finding>>, DatasetError> {
         let atlases = self.atlases;
-        let decoded = match self.read(path) {
+        let decoded = match self.read(folder, path) {
             Ok(file) => map_file::decode(file, map, || atlases.mesh(at))?,
             Err(fault) => Err(fault),
         };
@@ -139,8 +148,8 @@ impl Reader<'_> {
         Ok(Ok(texture))
     }
 
-    fn read(&mut self, path: &Path) -> Result<SubmittedFile, FileFault> {
-        let file = SubmittedFile::read(self.submission, path, MAX_MAP_BYTES)?;
+    fn read(&mut self, folder: MapFolder<'_>, path: &Path) -> Result<SubmittedFile, FileFault> {
+        let file = folder.read(path)?;
         self.files.push(file.hashed.clone());
         Ok(file)
     }
@@ -207,10 +216,11 @@ impl MemoryBudget {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{Vec2, Vec3};
+    use glam::Vec3;
     use mateval_dataset::TriangleMesh;
     use mateval_image::exr_io::{self, Precision};
     use mateval_image::{LinearRgb, Picture, png_io};
+    use mateval_testkit::scenes::quad;
     use serde_json::json;
     use std::collections::BTreeMap;
     use std::path::PathBuf;
@@ -254,13 +264,7 @@ mod tests {
 
     /// Three atlases of two triangles that cover all texels.
     fn atlases() -> Vec<TriangleMesh> {
-        let mesh = TriangleMesh {
-            positions: vec![Vec3::ZERO; 4],
-            normals: None,
-            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        };
-        vec![mesh; 3]
+        vec![quad(Vec3::ZERO, Vec3::X, Vec3::Y); 3]
     }
 
     fn read(folder: &tempfile::TempDir) -> PredictedScene {

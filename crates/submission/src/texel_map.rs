@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 /// The least cosine between ray and normal that is used; grazing rays count as having it.
 pub const LEAST_COSINE: f64 = 1e-3;
 
-/// A texel of an atlas of which at least a part lies on the surface.
+/// A texel of an atlas that lies at least partly on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTexel {
     pub column: usize,
@@ -62,7 +62,7 @@ impl TexelMap {
         let coverage = Coverage::new(atlas, size);
         let mesh = &world.scene().surfaces[surface.0].mesh;
         let texel_m2 = (0..mesh.triangles.len()).map(|triangle| texel_m2(mesh, &coverage, triangle)).collect();
-        let observer = Observer { world, surface, mesh, coverage, texel_m2, eye: Eye::new(camera) };
+        let observer = Observer { world, surface, mesh, coverage, texel_m2, camera: InputCamera::new(camera) };
         Self { size, rows: (0..size).into_par_iter().map(|y| observer.row(size, y)).collect() }
     }
 
@@ -135,14 +135,14 @@ impl Cell {
     }
 }
 
-struct Eye {
+struct InputCamera {
     camera: Camera,
     projection: Projection,
     /// The camera's position, rounded as rays are.
     origin: DVec3,
 }
 
-impl Eye {
+impl InputCamera {
     fn new(camera: &Camera) -> Self {
         // Rays start at single precision, so their directions must be computed from the rounded place.
         let origin = camera.position().as_vec3().as_dvec3();
@@ -155,17 +155,17 @@ impl Eye {
 }
 
 /// A place of a triangle, and the ray from the camera towards it.
-struct Sight {
+struct AimedRay {
     triangle: usize,
     place: DVec3,
     ray: Ray,
 }
 
-impl Sight {
-    fn new(eye: &Eye, triangle: usize, place: DVec3) -> Self {
-        let offset = place - eye.origin;
+impl AimedRay {
+    fn new(camera: &InputCamera, triangle: usize, place: DVec3) -> Self {
+        let offset = place - camera.origin;
         let direction = offset / offset.length();
-        Self { triangle, place, ray: Ray::endless(eye.origin.as_vec3(), direction.as_vec3()) }
+        Self { triangle, place, ray: Ray::endless(camera.origin.as_vec3(), direction.as_vec3()) }
     }
 }
 
@@ -177,7 +177,7 @@ struct Observer<'a> {
     coverage: Coverage,
     /// By triangle.
     texel_m2: Vec<f64>,
-    eye: Eye,
+    camera: InputCamera,
 }
 
 impl Observer<'_> {
@@ -189,22 +189,22 @@ impl Observer<'_> {
             cells[part.column].add(&part, part.area * self.texel_m2[part.triangle], holds_centre, centre);
         });
         let covered = cells.iter().enumerate().filter(|(_, cell)| cell.area_m2 > 0.0);
-        let (mut texels, sights): (Vec<Texel>, Vec<Option<Sight>>) =
+        let (mut texels, aimed_rays): (Vec<Texel>, Vec<Option<AimedRay>>) =
             covered.filter_map(|(x, cell)| self.texel(size, x, cell)).unzip();
-        let rays: Vec<Ray> = sights.iter().flatten().map(|sight| sight.ray).collect();
+        let rays: Vec<Ray> = aimed_rays.iter().flatten().map(|aimed| aimed.ray).collect();
         let mut hits = Vec::with_capacity(rays.len());
         self.world.first_hits(&rays, &mut hits);
-        let in_frame = texels.iter_mut().zip(&sights).filter_map(|(texel, sight)| Some((texel, sight.as_ref()?)));
-        for ((texel, sight), hit) in in_frame.zip(hits) {
+        let in_frame = texels.iter_mut().zip(&aimed_rays).filter_map(|(texel, aimed)| Some((texel, aimed.as_ref()?)));
+        for ((texel, aimed), hit) in in_frame.zip(hits) {
             // A ray may miss the edge that it is aimed at; then nothing hides the place.
-            texel.observed = hit.is_none_or(|hit| self.is_place(sight, &hit));
+            texel.observed = hit.is_none_or(|hit| self.is_place(aimed, &hit));
         }
         texels
     }
 
     /// A texel that is not observed yet, and how the camera could see it, if its picture holds the place. None for a
     /// texel that is cut out.
-    fn texel(&self, size: usize, x: usize, cell: &Cell) -> Option<(Texel, Option<Sight>)> {
+    fn texel(&self, size: usize, x: usize, cell: &Cell) -> Option<(Texel, Option<AimedRay>)> {
         // Rounding may put a place on an edge slightly outside.
         let weights = self.coverage.barycentrics(cell.triangle, cell.place).max(DVec3::ZERO);
         let weights = weights / weights.element_sum();
@@ -221,7 +221,7 @@ impl Observer<'_> {
             at_centre: cell.at_centre,
             observed: false,
         };
-        Some((texel, self.eye.frame_holds(place).then(|| Sight::new(&self.eye, cell.triangle, place))))
+        Some((texel, self.camera.frame_holds(place).then(|| AimedRay::new(&self.camera, cell.triangle, place))))
     }
 
     fn opacity(&self, triangle: usize, weights: DVec3) -> f32 {
@@ -230,14 +230,14 @@ impl Observer<'_> {
     }
 
     /// Whether the first hit towards a place is that place, or nothing nearer by more than rounding.
-    fn is_place(&self, sight: &Sight, hit: &Hit) -> bool {
-        if hit.surface == self.surface && hit.triangle.0 == sight.triangle {
+    fn is_place(&self, aimed: &AimedRay, hit: &Hit) -> bool {
+        if hit.surface == self.surface && hit.triangle.0 == aimed.triangle {
             return true;
         }
-        let offset = sight.place - self.eye.origin;
+        let offset = aimed.place - self.camera.origin;
         let distance = offset.length();
-        let slope = self.mesh.geometric_normal(sight.triangle).dot(offset / distance).abs().max(LEAST_COSINE);
-        let coordinate = sight.place.abs().max(self.eye.origin.abs()).max_element();
+        let slope = self.mesh.geometric_normal(aimed.triangle).dot(offset / distance).abs().max(LEAST_COSINE);
+        let coordinate = aimed.place.abs().max(self.camera.origin.abs()).max_element();
         f64::from(hit.distance) >= distance - SAME_PLACE_ROUNDINGS * ROUNDING * coordinate / slope
     }
 }

@@ -1,7 +1,9 @@
 //! Valid and invalid archives, and a photo of a telephone, written byte by byte.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use crate::files_below;
 
 /// A file in a zip: its packed bytes, and what the central directory states of it.
 #[derive(Clone)]
@@ -158,18 +160,8 @@ pub fn gzip(bytes: &[u8]) -> Vec<u8> {
 
 /// The relative names and the bytes of all files in a folder, sorted.
 pub fn files(root: &Path) -> Vec<(String, Vec<u8>)> {
-    let (mut found, mut folders) = (Vec::new(), vec![root.to_owned()]);
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(root).unwrap().to_str().unwrap().to_owned();
-                found.push((name, std::fs::read(path).unwrap()));
-            }
-        }
-    }
+    let entry = |file: PathBuf| (file.to_str().unwrap().to_owned(), std::fs::read(root.join(&file)).unwrap());
+    let mut found: Vec<_> = files_below(root).into_iter().map(entry).collect();
     found.sort();
     found
 }

@@ -118,11 +118,11 @@ pub enum RequestFault {
     WeightCount { found: usize, expected: usize },
     #[error("weight {found} of light {}, expected a finite one of at least 0", light.0)]
     Weight { light: LightIndex, found: f64 },
-    #[error("{atlases} atlases and {coats} coats, expected one of each for each of {surfaces} surfaces")]
-    SurfaceCount { atlases: usize, coats: usize, surfaces: usize },
+    #[error("{atlases} atlases and maps of {maps} surfaces, expected one of each for each of {surfaces} surfaces")]
+    SurfaceCount { atlases: usize, maps: usize, surfaces: usize },
     #[error("surface {} '{name}': an atlas of {found} triangles for a mesh of {expected}", surface.0)]
     AtlasTriangles { surface: SurfaceIndex, name: String, found: usize, expected: usize },
-    #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for some vertex", surface.0)]
+    #[error("surface {} '{name}': maps whose atlas lacks a finite uv for some vertex", surface.0)]
     AtlasUv { surface: SurfaceIndex, name: String },
     #[error("surface {} '{name}': {found} base colours, expected {expected} on each surface", surface.0)]
     BaseColorCount { surface: SurfaceIndex, name: String, found: usize, expected: usize },

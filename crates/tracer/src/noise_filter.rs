@@ -1,10 +1,10 @@
 //! Takes the noise out of a render without blurring its textures.
 //!
-//! Light is smooth over surfaces, divided by the base colour of what it falls on where it follows that. It is filtered
-//! with the edge-avoiding a-trous wavelets of Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast Global
-//! Illumination Filtering" (2010), whose weights follow the noise as in Schied et al., "Spatiotemporal Variance-Guided
-//! Filtering" (2017): pixels are averaged where they belong to one instance, face the same way, and differ by no more
-//! than noise explains. As samples grow, the noise and with it the filter's effect vanish.
+//! Light that follows the base colour of surfaces is divided by it first: the quotient is smooth over surfaces. It is
+//! filtered with the edge-avoiding a-trous wavelets of Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for
+//! fast Global Illumination Filtering" (2010), whose weights follow the noise as in Schied et al., "Spatiotemporal
+//! Variance-Guided Filtering" (2017): pixels are averaged where they belong to one instance, face the same way, and
+//! differ by no more than noise explains. As samples grow, the noise and with it the filter's effect vanish.
 
 use mateval_image::{LUMINANCE, LinearRgb, Mask, Normal, Picture};
 use rayon::prelude::*;

@@ -31,8 +31,8 @@ pub struct RenderSettings {
     pub samples: u32,
     /// Different seeds give independent pictures.
     pub seed: u64,
-    /// The largest number of scatterings after the first before the last direct light of a path: Blender's "max
-    /// bounces". Mitsuba's `max_depth` is larger by 2.
+    /// The largest number of scatterings after that at the first hit; light is still sampled at the last. Blender's
+    /// "max bounces"; Mitsuba's `max_depth` is larger by 2.
     pub max_bounces: u32,
     /// The first bounce at which Russian roulette may end a path.
     pub roulette_start: u32,
@@ -68,8 +68,8 @@ impl RenderSettings {
     }
 }
 
-/// Supplies BSDFs for `K` material variants, which one path serves: they differ in base colour, and at most two pairs of
-/// roughness and metallic share their densities.
+/// Supplies BSDFs for `K` material variants, which one path serves: they differ in base colour, and at most two pairs
+/// of roughness and metallic share their densities.
 pub(crate) trait MaterialSource<'w, const K: usize>: Copy {
     /// Prefetches the memory that [`Self::prefetch_texels`] reads for `hit`.
     fn prefetch(self, hit: &Hit);
@@ -137,7 +137,8 @@ struct Scattered {
 /// A path in progress, for `K` material variants.
 #[derive(Clone, Copy)]
 struct Path<const K: usize> {
-    which: usize,
+    /// The index of the path's start.
+    start: usize,
     sampler: Sampler,
     throughputs: [Vec3; K],
     /// Like `throughputs`, for stage lights that the ray meets.
@@ -158,7 +159,8 @@ struct Arrival<const K: usize> {
 
 /// Sampled light that counts unless its shadow ray is blocked.
 struct LightSample<const K: usize> {
-    which: usize,
+    /// The index of the path's start.
+    start: usize,
     sampler: Sampler,
     light: LightIndex,
     values: [Vec3; K],
@@ -212,9 +214,9 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     ) {
         self.paths.clear();
         self.rays.clear();
-        for (which, (sampler, ray)) in starts.into_iter().enumerate() {
+        for (start, (sampler, ray)) in starts.into_iter().enumerate() {
             let throughputs = [Vec3::ONE; K];
-            self.paths.push(Path { which, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
+            self.paths.push(Path { start, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
             self.rays.push(ray);
         }
         self.counts.paths += self.paths.len() as u64;
@@ -257,7 +259,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
                 && let Some(radiance) = self.materials.known_radiance(&place, -ray.direction())
             {
                 let known = LightIndex(self.world.emitters().groups());
-                contributions.contribute(path.which, known, path.throughputs.map(|throughput| throughput * radiance));
+                contributions.contribute(path.start, known, path.throughputs.map(|throughput| throughput * radiance));
                 continue;
             }
             // Stop paths that have scattered often enough.
@@ -310,7 +312,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
         let mut contributions =
             Contributions { world: self.world, settings: &self.settings, counts: &mut self.counts, add };
         for (light_sample, _) in self.light_samples.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
-            contributions.contribute(light_sample.which, light_sample.light, light_sample.values);
+            contributions.contribute(light_sample.start, light_sample.light, light_sample.values);
         }
     }
 }
@@ -346,7 +348,7 @@ fn sample_light<const K: usize>(
     };
     let contribution = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
     let values = std::array::from_fn(contribution);
-    let sample = LightSample { which: path.which, sampler: path.sampler, light: light.light, values };
+    let sample = LightSample { start: path.start, sampler: path.sampler, light: light.light, values };
     Some((shadow, sample))
 }
 
@@ -444,15 +446,15 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Contributions<'_, K
             (Some(Scattered { density, .. }), LightSampling::Both) => power_heuristic(density, emitted.density),
         };
         let values = throughputs.map(|throughput| throughput * emitted.radiance * weight);
-        self.contribute(path.which, emitted.light, values);
+        self.contribute(path.start, emitted.light, values);
     }
 
-    fn contribute(&mut self, which: usize, light: LightIndex, values: [Vec3; K]) {
+    fn contribute(&mut self, start: usize, light: LightIndex, values: [Vec3; K]) {
         // A value that is not finite in one variant does not spoil the others.
         let finite = values.map(|value| if value.is_finite() { value } else { Vec3::ZERO });
         let counts = self.counts.not_finite.iter_mut().zip(values);
         counts.for_each(|(count, value)| *count += u64::from(!value.is_finite()));
-        (self.add)(which, light, finite);
+        (self.add)(start, light, finite);
     }
 }
 

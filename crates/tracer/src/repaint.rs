@@ -26,7 +26,7 @@ use crate::world::World;
 /// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when
 /// looked up.
 #[derive(Clone, Debug)]
-pub struct Coat {
+pub struct SurfaceMaps {
     /// One per prediction; lookups return linear values.
     pub base_colors: Vec<Texture>,
     pub scattering: Scattering,
@@ -45,7 +45,7 @@ pub struct Scattering {
 #[derive(Debug)]
 pub struct Repaint {
     /// One per surface; `None` keeps the world's own material.
-    coats: Vec<Option<Coat>>,
+    maps: Vec<Option<SurfaceMaps>>,
     second: Option<SecondScattering>,
     /// The atlas uvs of all triangles of the world, surface by surface.
     uvs: Vec<[Vec2; 3]>,
@@ -59,7 +59,7 @@ pub struct Repaint {
 #[derive(Debug)]
 struct SecondScattering {
     from: usize,
-    /// One per surface; some where the surface has a coat.
+    /// One per surface; some where the surface has predicted maps.
     of_surface: Vec<Option<Scattering>>,
 }
 
@@ -78,30 +78,30 @@ pub const MOST_PREDICTIONS_AT_ONCE: usize = MOST_VARIANTS;
 pub const SPECULAR: f32 = 0.5;
 
 impl Repaint {
-    /// Predictions for `world`. Both `atlases` and `coats` hold one entry per surface; coats are looked up at the uvs
-    /// of the atlases.
+    /// Predictions for `world`. Both `atlases` and `maps` hold one entry per surface; maps are looked up at the uvs of
+    /// the atlases.
     ///
-    /// Fails if the triangles of the atlases are not the world's, if the atlas of a coat has no uv, or if coats hold
-    /// different numbers of base colours, or none.
+    /// Fails if the triangles of the atlases are not the world's, if the atlas of a surface with maps has no uv, or if
+    /// surfaces have different numbers of base colours, or none.
     pub fn new(
         world: &World,
         atlases: &[TriangleMesh],
-        coats: Vec<Option<Coat>>,
+        maps: Vec<Option<SurfaceMaps>>,
         flavour: PrincipledFlavour,
     ) -> Result<Self, TracerError> {
-        let predictions = check_coats(&world.scene().surfaces, atlases, &coats)?;
+        let predictions = check_maps(&world.scene().surfaces, atlases, &maps)?;
         let uvs = atlases.iter().flat_map(corner_uvs).collect();
         let eta = eta_from_specular(SPECULAR);
-        Ok(Self { coats, second: None, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
+        Ok(Self { maps, second: None, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
     }
 
     /// The same, but predictions from number `from` on have the roughness and metallic of `of_surface`, which holds one
     /// entry per surface. Directions are sampled from both densities in equal parts, for all predictions.
     ///
-    /// Fails unless exactly the surfaces with a coat have an entry.
+    /// Fails unless exactly the surfaces with maps have an entry.
     pub fn with_second(self, from: usize, of_surface: Vec<Option<Scattering>>) -> Result<Self, TracerError> {
-        let coated = |coats: &[Option<Coat>]| coats.iter().map(Option::is_some).collect::<Vec<_>>();
-        if coated(&self.coats) != of_surface.iter().map(Option::is_some).collect::<Vec<_>>() {
+        let has_maps: Vec<bool> = self.maps.iter().map(Option::is_some).collect();
+        if has_maps != of_surface.iter().map(Option::is_some).collect::<Vec<_>>() {
             return Err(RequestFault::SecondScattering.into());
         }
         Ok(Self { second: Some(SecondScattering { from, of_surface }), ..self })
@@ -112,22 +112,22 @@ impl Repaint {
         self.predictions
     }
 
-    /// The base colours of a coat at `uv`, of predictions `first..first + K`. Predictions beyond the last repeat it.
-    fn base_colors<const K: usize>(&self, coat: &Coat, first: usize, uv: Vec2) -> [Vec3; K] {
+    /// The base colours at `uv` of predictions `first..first + K`. Predictions beyond the last repeat it.
+    fn base_colors<const K: usize>(&self, maps: &SurfaceMaps, first: usize, uv: Vec2) -> [Vec3; K] {
         from_fn(|k| {
             let which = (first + k).min(self.predictions - 1);
-            let color = Vec3::from_array(coat.base_colors[which].sample(uv.to_array()));
+            let color = Vec3::from_array(maps.base_colors[which].sample(uv.to_array()));
             color.clamp(Vec3::ZERO, Vec3::ONE)
         })
     }
 
-    /// The material of `base_color` with these maps at `uv`.
-    fn principled(&self, base_color: Vec3, maps: &Scattering, uv: Vec2) -> Principled<'_> {
+    /// The material of `base_color` with this scattering at `uv`.
+    fn principled(&self, base_color: Vec3, scattering: &Scattering, uv: Vec2) -> Principled<'_> {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
         Principled {
             base_color,
-            roughness: scalar(&maps.roughness),
-            metallic: scalar(&maps.metallic),
+            roughness: scalar(&scattering.roughness),
+            metallic: scalar(&scattering.metallic),
             eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
         }
@@ -143,9 +143,9 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
     fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2 {
         let [a, b, c] = self.repaint.uvs[hit.global as usize];
         let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
-        if let Some(coat) = &self.repaint.coats[place.surface.0] {
-            let colors = coat.base_colors[self.first..].iter().take(K);
-            let Scattering { roughness, metallic } = &coat.scattering;
+        if let Some(maps) = &self.repaint.maps[place.surface.0] {
+            let colors = maps.base_colors[self.first..].iter().take(K);
+            let Scattering { roughness, metallic } = &maps.scattering;
             for texture in colors.chain([roughness, metallic]) {
                 texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
             }
@@ -154,14 +154,14 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
-        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf(place, wo) };
-        let base_colors = self.repaint.base_colors(coat, self.first, uv);
-        let principled = |maps| self.repaint.principled(base_colors[0], maps, uv);
+        let Some(maps) = &self.repaint.maps[place.surface.0] else { return self.world.bsdf(place, wo) };
+        let base_colors = self.repaint.base_colors(maps, self.first, uv);
+        let principled = |scattering| self.repaint.principled(base_colors[0], scattering, uv);
         let second = self.repaint.second.as_ref().and_then(|second| {
-            let maps = second.of_surface[place.surface.0].as_ref()?;
-            Some((principled(maps), second.from.saturating_sub(self.first)))
+            let scattering = second.of_surface[place.surface.0].as_ref()?;
+            Some((principled(scattering), second.from.saturating_sub(self.first)))
         });
-        Bsdf::of_principled(principled(&coat.scattering), second, &base_colors, place, wo)
+        Bsdf::of_principled(principled(&maps.scattering), second, &base_colors, place, wo)
     }
 }
 
@@ -181,7 +181,7 @@ pub fn render_repainted(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ViewsRender>, TracerError> {
     // Check everything before the first path.
-    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
+    let (found, expected) = (repaint.maps.len(), world.scene().surfaces.len());
     if found != expected {
         return Err(RequestFault::OtherWorld { found, expected }.into());
     }
@@ -209,21 +209,25 @@ pub fn render_repainted(
 }
 
 /// Checks the arguments of [`Repaint::new`] and returns the number of predictions.
-fn check_coats(surfaces: &[Surface], atlases: &[TriangleMesh], coats: &[Option<Coat>]) -> Result<usize, RequestFault> {
-    if atlases.len() != surfaces.len() || coats.len() != surfaces.len() {
-        let (atlases, coats) = (atlases.len(), coats.len());
-        return Err(RequestFault::SurfaceCount { atlases, coats, surfaces: surfaces.len() });
+fn check_maps(
+    surfaces: &[Surface],
+    atlases: &[TriangleMesh],
+    maps: &[Option<SurfaceMaps>],
+) -> Result<usize, RequestFault> {
+    if atlases.len() != surfaces.len() || maps.len() != surfaces.len() {
+        let (atlases, maps) = (atlases.len(), maps.len());
+        return Err(RequestFault::SurfaceCount { atlases, maps, surfaces: surfaces.len() });
     }
-    let colors = coats.iter().flatten().map(|coat| coat.base_colors.len());
+    let colors = maps.iter().flatten().map(|maps| maps.base_colors.len());
     let predictions = colors.max().unwrap_or(1).max(1);
-    for (index, ((surface, atlas), coat)) in surfaces.iter().zip(atlases).zip(coats).enumerate() {
+    for (index, ((surface, atlas), maps)) in surfaces.iter().zip(atlases).zip(maps).enumerate() {
         let (index, name) = (SurfaceIndex(index), || surface.name.clone());
         let (found, expected) = (atlas.triangles.len(), surface.mesh.triangles.len());
         if found != expected {
             return Err(RequestFault::AtlasTriangles { surface: index, name: name(), found, expected });
         }
-        let Some(coat) = coat else { continue };
-        let (found, expected) = (coat.base_colors.len(), predictions);
+        let Some(maps) = maps else { continue };
+        let (found, expected) = (maps.base_colors.len(), predictions);
         if found != expected {
             return Err(RequestFault::BaseColorCount { surface: index, name: name(), found, expected });
         }

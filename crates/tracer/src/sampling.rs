@@ -10,14 +10,17 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 use glam::{Vec2, Vec3};
 use mateval_dataset::splitmix64;
 
-/// The random numbers of one sample of one pixel.
+/// The random numbers of one sample of one pixel, in sets.
+///
+/// Set 0 is the place in the pixel, or in the cell of a shared plane. At scattering s, from 0, a path takes set 1 + 2 s
+/// for its light sample, and set 2 + 2 s for its BSDF sample and Russian roulette.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     key: u64,
     index: u32,
 }
 
-/// The sets of the pixel position and of the first three surfaces.
+/// The last set of the first three scatterings.
 const LAST_SPREAD_SET: u32 = 6;
 
 /// log2 of the samples in one sequence; later samples start another sequence.

@@ -23,11 +23,11 @@ use rayon::prelude::*;
 use crate::aov::hit_through;
 use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
 use crate::error::{ExceededLimit, RequestFault, TracerError};
-use crate::light_basis::LightBasis;
 use crate::path::{MaterialSource, PathTracer, RenderSettings};
 use crate::ray::{Hit, SurfaceHit};
 use crate::render::{Progress, Tile, camera_start, tiles};
 use crate::repaint::SPECULAR;
+use crate::shared_centre::LightBasis;
 use crate::world::World;
 
 /// A photo as a cache of the radiance that leaves the places it shows.

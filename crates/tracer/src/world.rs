@@ -130,7 +130,7 @@ impl World {
         &self.scene
     }
 
-    /// The hierarchy, for [`Self::sharing`].
+    /// The hierarchy, for queries that skip surfaces and for [`Self::sharing`].
     pub fn accel(&self) -> &Arc<Accel> {
         &self.accel
     }
@@ -162,7 +162,7 @@ impl World {
 
     /// The first surface along a direction that is not glass.
     fn first_behind_glass(&self, from: &SurfaceHit, direction: Vec3) -> Option<SurfaceHit> {
-        /// Panes behind one another; after so many, glass counts as any surface.
+        /// The largest number of panes in a row that are looked through. Glass behind them counts as any surface.
         const MOST_PANES: usize = 16;
         let mut met = self.surface_hit(&self.first_hit(&from.spawn(direction))?);
         for _ in 0..MOST_PANES {
@@ -227,10 +227,6 @@ impl World {
     /// The opacity at a place; 1 if the material has none.
     pub(crate) fn opacity_at(&self, place: &SurfaceHit) -> f32 {
         self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
-    }
-
-    pub fn material(&self, hit: &Hit) -> &Material {
-        self.material_of(hit.surface)
     }
 
     pub fn material_of(&self, surface: SurfaceIndex) -> &Material {

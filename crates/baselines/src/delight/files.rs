@@ -5,7 +5,7 @@ use std::path::Path;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, Report, json};
 use mateval_files::FileError;
-use mateval_files::work_folder::WorkFolder;
+use mateval_files::work_folder::{WorkFolder, make_folder};
 use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
@@ -45,7 +45,7 @@ pub fn write(
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let delit = delight(&geometry, options, progress)?;
         let folder = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+        make_folder(&folder)?;
         write_pictures(&folder, &delit, scene.exposure as f32)?;
         let lights =
             LightsFile { format: "mateval-fitted-lights/2", candidates: options.lights, lights: &delit.lights };

@@ -13,6 +13,7 @@ use mateval_tracer::{PhotoCache, Ray, Sampler, SurfaceHit};
 use rayon::prelude::*;
 
 use super::room::PartRoom;
+use super::surfaces::upper_median;
 
 /// A part that mirrors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,14 +75,10 @@ fn mirror(room: &PartRoom, cache: &PhotoCache<'_>, pixels: &[usize]) -> Option<M
             .collect();
         let reach = (SLOW_REACH * room.photo.width() as f64).round() as usize;
         let found = comparison(room.photo.width(), reach, &pairs)?;
-        let base_color = [0, 1, 2].map(|c| {
-            let median = |which: usize| {
-                let mut values: Vec<f32> = pairs.iter().map(|(_, pair)| pair[which].0[c]).collect();
-                let middle = values.len() / 2;
-                *values.select_nth_unstable_by(middle, f32::total_cmp).1
-            };
-            (median(0) / median(1).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0)
-        });
+        let median_of =
+            |which: usize| upper_median(&mut pairs.iter().map(|(_, pair)| pair[which].0).collect::<Vec<_>>());
+        let [shown, seen_elsewhere] = [median_of(0), median_of(1)];
+        let base_color = [0, 1, 2].map(|c| (shown[c] / seen_elsewhere[c].max(f32::MIN_POSITIVE)).clamp(0.0, 1.0));
         Some((found, Mirror { base_color, roughness: *roughness }))
     });
     let best = fits.max_by(|(a, _), (b, _)| a.correlation.total_cmp(&b.correlation))?;

@@ -59,7 +59,7 @@ pub(super) fn part_colors(room: &PartRoom, base_color: &Picture<LinearRgb>) -> V
         of_owner.entry(room.owners[usize::from(*part)]).or_default().push(color.0);
     }
     let medians = |all: BTreeMap<usize, Vec<[f32; 3]>>| -> BTreeMap<usize, [f32; 3]> {
-        all.into_iter().map(|(at, mut colors)| (at, median(&mut colors))).collect()
+        all.into_iter().map(|(at, mut colors)| (at, upper_median(&mut colors))).collect()
     };
     let (of_part, of_owner) = (medians(of_part), medians(of_owner));
     let grey = match of_part.len() {
@@ -70,7 +70,8 @@ pub(super) fn part_colors(room: &PartRoom, base_color: &Picture<LinearRgb>) -> V
     room.owners.iter().enumerate().map(color).collect()
 }
 
-fn median(colors: &mut [[f32; 3]]) -> [f32; 3] {
+/// The median of each channel; of an even number of colours the higher of the middle two.
+pub(super) fn upper_median(colors: &mut [[f32; 3]]) -> [f32; 3] {
     let middle = colors.len() / 2;
     [0, 1, 2].map(|channel| {
         let (_, value, _) = colors.select_nth_unstable_by(middle, |a, b| a[channel].total_cmp(&b[channel]));

@@ -138,12 +138,12 @@ impl DonorMaterial {
     fn flattened(&self, [base, numbers]: [bool; 2]) -> Self {
         let mut flat = self.clone();
         if base && let (factor, Some(texture)) = &self.base_color {
-            let mean = mean_of(texture);
-            flat.base_color = (std::array::from_fn(|channel| factor[channel] * mean[channel]), None);
+            let mean = texture.mean();
+            flat.base_color = (std::array::from_fn(|channel| factor[channel] * mean[channel] as f32), None);
         }
         for scalar in [&mut flat.roughness, &mut flat.metallic].into_iter().flatten().filter(|_| numbers) {
             if let Some((texture, channel)) = scalar.texture.take() {
-                scalar.factor *= mean_of(&texture)[channel];
+                scalar.factor *= texture.mean()[channel] as f32;
             }
         }
         flat
@@ -156,15 +156,6 @@ pub(super) fn shift_near(place: DVec3, shift: DVec3) -> DVec3 {
     if place.distance(shift) < place.length() { shift } else { DVec3::ZERO }
 }
 
-/// The mean of all texels, summed in f64.
-fn mean_of(texture: &Texture) -> [f32; 3] {
-    let mut sum = [0.0; 3];
-    for (x, y) in (0..texture.height()).flat_map(|y| (0..texture.width()).map(move |x| (x, y))) {
-        sum.iter_mut().zip(texture.texel(x, y)).for_each(|(sum, value)| *sum += f64::from(value));
-    }
-    sum.map(|sum: f64| (sum / (texture.width() * texture.height()) as f64) as f32)
-}
-
 impl Donor {
     /// Whether the file states the triangle's base colour, by its material or at its corners.
     fn states_base_color(&self, triangle: &DonorTriangle) -> bool {
@@ -175,7 +166,7 @@ impl Donor {
             (Glow::None, _) => false,
             (_, ([0.0, 0.0, 0.0], _)) => true,
             (Glow::Textured, ([1.0, 1.0, 1.0], None)) => !triangle.is_painted,
-            (Glow::Textured, (_, Some(texture))) => mean_of(texture) == [0.0; 3],
+            (Glow::Textured, (_, Some(texture))) => texture.mean() == [0.0; 3],
             _ => false,
         };
         (material.states_base_color || triangle.is_painted) && !is_baked

@@ -32,7 +32,7 @@ use super::part_samples::{PartSamples, Sample};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
 use crate::geometry::{PartTriangles, SceneGeometry, SeenPixels};
-use crate::maps::{DEFAULT, Medians, median};
+use crate::maps::{DEFAULT, Medians, lower_median};
 
 word_enum! {
     /// How a graph is chosen.
@@ -190,7 +190,7 @@ impl PartMaterial {
         unseen: Values,
     ) -> Result<Self, BaselineError> {
         let pixels = part.shown.len();
-        let values = if pixels == 0 { unseen } else { median(&mut part.shown.clone()) };
+        let values = if pixels == 0 { unseen } else { lower_median(&mut part.shown.clone()) };
         let values = completed(values, given);
         let (frame, reason) = (part.frame, Reason::Unseen);
         let flat = Self { values, graph: None, chart: None, frame, reason, fit: None, pixels };

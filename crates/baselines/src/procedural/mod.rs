@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, json};
 use mateval_files::FileError;
-use mateval_files::work_folder::{WorkFolder, check_free};
+use mateval_files::work_folder::{WorkFolder, check_free, make_folder};
 use mateval_image::png_io;
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
@@ -81,7 +81,7 @@ pub fn write(
         })?;
         // The scene's folder of the report.
         let place = work.path().join(scene.id.as_str());
-        std::fs::create_dir_all(&place).map_err(FileError::io("make", &place))?;
+        make_folder(&place)?;
         write_graphs(&place.join("materials.mtlx"), &materials)?;
         let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
         let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use mateval_dataset::dataset::{Part, SceneFile};
+use mateval_dataset::ids::unused_name;
 use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_image::png_io::write_srgb;
@@ -141,7 +142,7 @@ pub(super) fn write_graphs(path: &Path, materials: &SceneMaterials<'_>) -> Resul
     let mut graphs: Vec<Graph> = Vec::new();
     for (part, material) in materials.triangles.parts.iter().zip(&materials.of_part) {
         let Some(found) = &material.graph else { continue };
-        let name = distinct(name_of(part.id.as_str()), &mut names);
+        let name = unused_name(&name_of(part.id.as_str()), '_', &mut names);
         let doc = format!("{} of part '{}'", found.graph.name, part.id);
         graphs.push(Graph { doc: Some(doc), ..found.settings.as_defaults(&found.graph, &name) });
     }
@@ -153,17 +154,6 @@ pub(super) fn write_graphs(path: &Path, materials: &SceneMaterials<'_>) -> Resul
 fn name_of(part: &str) -> String {
     let allowed = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     format!("part_{}", part.chars().map(allowed).collect::<String>())
-}
-
-/// The name with a number, if it is taken.
-fn distinct(name: String, taken: &mut BTreeSet<String>) -> String {
-    let mut found = name.clone();
-    let mut number = 2;
-    while !taken.insert(found.clone()) {
-        found = format!("{name}_{number}");
-        number += 1;
-    }
-    found
 }
 
 /// Pixels of a margin around what shows a part.
@@ -373,7 +363,7 @@ mod tests {
     fn names_are_allowed_and_distinct() {
         let mut taken = BTreeSet::new();
         let named: Vec<String> =
-            ["floor-p0", "floor.p0", "floor_p0"].map(|part| distinct(name_of(part), &mut taken)).into();
+            ["floor-p0", "floor.p0", "floor_p0"].map(|part| unused_name(&name_of(part), '_', &mut taken)).into();
         assert_eq!(named, ["part_floor_p0", "part_floor_p0_2", "part_floor_p0_3"]);
     }
 }

@@ -8,12 +8,12 @@ use clap::builder::PossibleValue;
 use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{SceneId, json};
 use mateval_eval::metric::PictureKind;
-use mateval_eval::protocol::Track;
+use mateval_eval::protocol::{Protocol, Track};
 use mateval_eval::result::ResultFile;
 use mateval_report::explain::{self, ExplainPlan};
 use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::marks::{TrustedKeys, Verified};
-use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, marks, write};
+use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries, marks};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_report::votes::{plain, preferences};
@@ -32,7 +32,7 @@ pub struct TablesArgs {
     #[arg(long, value_name = "RESULT.json")]
     ceiling: Option<PathBuf>,
     /// Protocol whose scores are shown.
-    #[arg(long, default_value = "mateval-3")]
+    #[arg(long, default_value = Protocol::DEFAULT)]
     protocol: String,
     /// Format of the tables.
     #[arg(long, value_enum, default_value = "markdown")]
@@ -103,7 +103,7 @@ pub struct ExplainArgs {
     #[arg(long)]
     submission: PathBuf,
     /// Protocol whose scores are explained.
-    #[arg(long, default_value = "mateval-3")]
+    #[arg(long, default_value = Protocol::DEFAULT)]
     protocol: String,
     /// Folder for explain.md and pictures of the ten worst instances.
     #[arg(long)]
@@ -266,7 +266,7 @@ pub struct LeaderboardArgs {
     #[arg(long)]
     out: PathBuf,
     /// Protocol whose scores are ranked.
-    #[arg(long, default_value = "mateval-3")]
+    #[arg(long, default_value = Protocol::DEFAULT)]
     protocol: String,
     /// Accept results that lack scenes, and rank each on the scenes that it covers; they are marked.
     #[arg(long)]
@@ -353,7 +353,7 @@ impl LeaderboardArgs {
             votes: self.votes,
             tool: TOOL.to_owned(),
         };
-        with_progress(|progress| write(&plan, &self.out, self.force, progress))
+        with_progress(|progress| leaderboard::write(&plan, &self.out, self.force, progress))
             .context("cannot write the leaderboard")?;
         print(&format!("{}\n", self.out.join("index.html").display()))?;
         Ok(Outcome::Good)

@@ -17,14 +17,14 @@ use mateval_prep::perturb::{PerturbOptions, PerturbedScene, perturb};
 use mateval_prep::recipe::MOST_SAMPLES;
 use mateval_prep::render::{BlenderOptions, BlenderProgram, DeviceChoice, RenderOptions, Renderer, RendererKind};
 use mateval_prep::stats::findings::by_code;
-use mateval_prep::survey::rules::{RejectionLists, SelectionRules};
+use mateval_prep::survey::rules::SelectionRules;
 use mateval_prep::survey::selection::SelectionGoal;
 use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, survey};
 use mateval_sources::front3d::camera_rules::CameraRules;
 
 use crate::TOOL;
 use crate::arguments::word_parser;
-use crate::fetch::{cache_folder, check_blender};
+use crate::fetch::{FETCH_BLENDER, cache_folder, check_blender};
 use crate::terminal::{Outcome, counted, print, say, say_findings, with_progress};
 
 #[derive(clap::Args)]
@@ -48,9 +48,6 @@ pub struct SurveyArgs {
     /// TOML file with the conditions that a room must meet.
     #[arg(long)]
     rules: Option<PathBuf>,
-    /// CSV file (`id,reason`) of rooms, houses and models to reject; may be given several times.
-    #[arg(long = "list", value_name = "LIST.csv")]
-    lists: Vec<PathBuf>,
     /// The rules that drawn cameras keep. They also decide on resolution and field of view where none is given.
     #[arg(
         long,
@@ -102,10 +99,6 @@ impl SurveyArgs {
         let is_sound = fov_y_deg > 0.0 && fov_y_deg < 179.0;
         anyhow::ensure!(is_sound, "--fov-y-deg {fov_y_deg}: expected a number above 0 and below 179");
         let rules = self.rules.as_deref().map(SelectionRules::read).transpose().context("cannot read the rules")?;
-        let mut lists = RejectionLists::default();
-        for list in &self.lists {
-            lists.add(list).context("cannot read a list")?;
-        }
         Ok(SurveyOptions {
             source: self.source.clone(),
             houses: self.houses.clone(),
@@ -113,7 +106,6 @@ impl SurveyArgs {
             textures: self.textures.clone(),
             cameras: self.cameras.clone(),
             rules: rules.unwrap_or_default(),
-            lists,
             seed: self.seed,
             cameras_per_room: self.cameras_per_room,
             resolution: self.resolution.as_slice().try_into().unwrap_or(self.camera_rules.resolution()),
@@ -218,7 +210,7 @@ impl BuildArgs {
             out: self.out.clone(),
             scenes: self.scenes.clone(),
             force: self.force,
-            blender: find_blender(self.blender.clone())?,
+            blender: find_blender(self.blender.as_deref())?,
             atlas_cache: Some(cache_folder().join("atlases")),
         };
         let report = with_progress(|progress| mateval_prep::build::build(&options, TOOL, progress))
@@ -265,9 +257,6 @@ fn say_found(scenes: &[(SceneId, Vec<Finding>)]) {
     }
 }
 
-/// The command that installs Blender.
-const FETCH_BLENDER: &str = "mateval fetch blender";
-
 /// Arguments that concern Blender alone.
 #[derive(clap::Args, Clone, Debug)]
 pub struct BlenderArgs {
@@ -281,10 +270,10 @@ pub struct BlenderArgs {
     /// Number of scenes that Blender renders at once, each on a graphics card of its own where there are several.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     jobs: u16,
-    /// Longest time that Blender may take for a scene, in seconds.
+    /// Longest time that a Blender may take for a scene, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 7200, value_parser = clap::value_parser!(u32).range(1..))]
     time_limit: u32,
-    /// Most memory that Blender may take, in GiB.
+    /// Most memory that each Blender may take, in GiB.
     #[arg(long, value_name = "GIB", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
     memory_limit: u32,
     /// How often Blender is run for a scene before the scene counts as failed.
@@ -293,26 +282,46 @@ pub struct BlenderArgs {
 }
 
 /// The Blender at this path, or else the usual one; absent if no path is given and none is installed.
-pub fn find_blender(path: Option<PathBuf>) -> anyhow::Result<Option<BlenderOptions>> {
-    let arguments = BlenderArgs {
-        blender: path,
-        device: DeviceChoice::Cpu,
-        jobs: 1,
-        time_limit: 7200,
-        memory_limit: 16,
-        attempts: 1,
-    };
-    match arguments.options() {
-        Ok(options) => Ok(Some(options)),
-        Err(error) if arguments.is_given() => Err(error),
+fn find_blender(path: Option<&Path>) -> anyhow::Result<Option<BlenderOptions>> {
+    match find_program(path) {
+        Ok(program) => Ok(Some(BlenderOptions::new(BlenderProgram(program)))),
+        Err(error) if named_program(path).is_some() => Err(error),
         Err(_) => Ok(None),
     }
+}
+
+/// The program that the user names, and where; `option` is that of `--blender`.
+fn named_program(option: Option<&Path>) -> Option<(PathBuf, &'static str)> {
+    let from_environment = std::env::var_os("MATEVAL_BLENDER").filter(|value| !value.is_empty());
+    let from_option = option.map(|path| (path.to_owned(), "--blender"));
+    from_option.or_else(|| from_environment.map(|path| (path.into(), "MATEVAL_BLENDER")))
+}
+
+/// The program that the user names, or else the one that was fetched; fails if it does not exist.
+fn find_program(option: Option<&Path>) -> anyhow::Result<PathBuf> {
+    let Some((program, origin)) = named_program(option) else {
+        let installed = cache_folder().join("blender/bin/python");
+        if installed.exists() {
+            return Ok(installed);
+        }
+        bail!(
+            "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{}' does not exist; run: \
+             {FETCH_BLENDER}, or give --renderer builtin",
+            installed.display()
+        );
+    };
+    // A name without a folder is searched for in PATH when it is run.
+    if program.components().count() > 1 && !program.is_file() {
+        let shown = program.display();
+        bail!("{origin} is '{shown}', which does not exist; expected Blender, or a Python with bpy");
+    }
+    Ok(program)
 }
 
 impl BlenderArgs {
     /// How Blender is run; fails where it cannot be found.
     pub fn options(&self) -> anyhow::Result<BlenderOptions> {
-        let mut options = BlenderOptions::new(BlenderProgram(self.program()?));
+        let mut options = BlenderOptions::new(BlenderProgram(find_program(self.blender.as_deref())?));
         options.device = self.device;
         options.jobs = usize::from(self.jobs);
         options.attempts = self.attempts;
@@ -321,36 +330,9 @@ impl BlenderArgs {
         Ok(options)
     }
 
-    /// The program that the user names, and where.
-    fn given(&self) -> Option<(PathBuf, &'static str)> {
-        let from_environment = std::env::var_os("MATEVAL_BLENDER").filter(|value| !value.is_empty());
-        let from_option = self.blender.clone().map(|path| (path, "--blender"));
-        from_option.or_else(|| from_environment.map(|path| (path.into(), "MATEVAL_BLENDER")))
-    }
-
     /// Whether the user names a program, which must then be usable.
     pub fn is_given(&self) -> bool {
-        self.given().is_some()
-    }
-
-    fn program(&self) -> anyhow::Result<PathBuf> {
-        let Some((program, origin)) = self.given() else {
-            let installed = cache_folder().join("blender/bin/python");
-            if installed.exists() {
-                return Ok(installed);
-            }
-            bail!(
-                "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{}' does not exist; run: \
-                 {FETCH_BLENDER}, or give --renderer builtin",
-                installed.display()
-            );
-        };
-        // A name without a folder is searched for in PATH when it is run.
-        if program.components().count() > 1 && !program.is_file() {
-            let shown = program.display();
-            bail!("{origin} is '{shown}', which does not exist; expected Blender, or a Python with bpy");
-        }
-        Ok(program)
+        named_program(self.blender.as_deref()).is_some()
     }
 }
 

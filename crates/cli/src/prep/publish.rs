@@ -70,7 +70,7 @@ struct ReportArgs {
     #[arg(long, value_name = "RESULT.json", requires = "report")]
     floor: Option<PathBuf>,
     /// For the report: the protocol whose scores are shown.
-    #[arg(long, default_value = "mateval-3", requires = "report")]
+    #[arg(long, default_value = Protocol::DEFAULT, requires = "report")]
     protocol: String,
     /// For the report: the day of publication, as in 2026-11-24.
     #[arg(long, requires = "report")]
@@ -333,7 +333,7 @@ impl ExportArgs {
         for path in &self.competition.floors {
             check_floor(&ResultFile::read(path)?, &dataset, &dataset.file.scenes)?;
         }
-        let protocol = Protocol::named("mateval-3")?;
+        let protocol = Protocol::named(Protocol::DEFAULT)?;
         let column = |key: &ResultKey| {
             let style = &key.metric.row().style;
             Column {

@@ -544,6 +544,30 @@ pub enum SourceKind {
 }
 
 impl SourceKind {
+    pub const ALL: [Self; 5] = [Self::Bitterli, Self::Front3d, Self::Gltf, Self::Blend, Self::Capture];
+
+    /// The name in tables.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Front3d => "3D-FRONT",
+            Self::Bitterli => "Bitterli",
+            Self::Gltf => "glTF",
+            Self::Blend => "Blender",
+            Self::Capture => "Captures",
+        }
+    }
+
+    /// The datasets that such scenes come from, in lower case without punctuation. Files of the other kinds belong to no known
+    /// dataset.
+    pub fn datasets(self) -> &'static [&'static str] {
+        match self {
+            // 3D-FRONT's furniture is 3D-FUTURE's.
+            Self::Front3d => &["3dfront", "3dfuture"],
+            Self::Bitterli => &["bitterli"],
+            Self::Gltf | Self::Blend | Self::Capture => &[],
+        }
+    }
+
     /// Whether the source states what its surfaces are made of. Otherwise the materials of `ground_truth` are
     /// placeholders: they are no truth, and only measured colours and photos are scored.
     pub fn states_materials(self) -> bool {
@@ -558,7 +582,7 @@ impl fmt::Display for SourceKind {
     }
 }
 
-// The words are listed once, in `dataset_spec/format/dataset.md`, so that a new source changes no schema.
+// The words are listed once, in `dataset_spec/format/recipe.md`, so that a new source changes no schema.
 impl JsonSchema for SourceKind {
     fn schema_name() -> Cow<'static, str> {
         "SourceKind".into()
@@ -566,7 +590,7 @@ impl JsonSchema for SourceKind {
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "The kind of source that a scene came from; format/dataset.md lists the words.",
+            "description": "The kind of source that a scene came from; format/recipe.md lists the words.",
             "type": "string",
             "pattern": "^[a-z0-9_]+$"
         })

@@ -16,7 +16,7 @@ pub const SCORER_JSON: &str = "scorer.json";
 /// The whole `scene.json` of a hidden split, in the scene's folder; the public one leaves out what leads to its sources.
 pub const WHOLE_SCENE: &str = "ground_truth/whole_scene.json";
 /// The input view's id.
-pub const INPUT: &str = "input";
+pub const INPUT: &str = ViewId::INPUT;
 
 /// The meshes of a set of parts, relative to the scene's folder: `geometry/parts.glb` for the source's own parts,
 /// `geometry/parts_<set>.glb` for another set.

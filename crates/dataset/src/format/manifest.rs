@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use mateval_files::source_folder::slashed;
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
 use mateval_files::whole::{is_abandoned, is_temporary, write_whole};
 use mateval_files::{FileError, work_folder};
@@ -29,8 +30,8 @@ pub fn is_withheld(root: &Path, finding: &Finding) -> bool {
 /// of a hidden split leaves out, and hidden files in `root` itself. Links to folders are not followed.
 pub fn list_files(root: &Path) -> Result<Vec<String>, DatasetError> {
     let mut files = list_below(root, Path::new(""))?;
-    let unlisted = [MANIFEST, DATASET, COMPARE, WITHHELD, SECRET];
-    files.retain(|file| !unlisted.contains(&file.as_str()) && !file.starts_with('.'));
+    let never_listed = [MANIFEST, DATASET, COMPARE, WITHHELD, SECRET];
+    files.retain(|file| !never_listed.contains(&file.as_str()) && !file.starts_with('.'));
     Ok(files)
 }
 
@@ -47,7 +48,7 @@ pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, Datas
             if kind.is_dir() {
                 folders.push(relative);
             } else {
-                files.push(relative.to_string_lossy().replace('\\', "/"));
+                files.push(slashed(&relative));
             }
         }
     }
@@ -234,7 +235,7 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
         if root.join(&file).exists() {
             let message =
                 format!("its hash is withheld, and '{WITHHELD}' is missing, which lies with the withheld files");
-            findings.push(fault("unlisted_file", &file, String::new(), &message));
+            findings.push(fault(UNLISTED_FILE, &file, String::new(), &message));
             listed.insert(file);
         } else {
             findings.push(fault(WITHHELD_FILE, &file, String::new(), "the manifest names it as withheld"));

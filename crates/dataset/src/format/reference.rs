@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::Vec2;
-use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap, png_io};
@@ -345,7 +345,7 @@ pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, DatasetError> {
 /// Writes textures to the folder `textures` in `place`, which is made.
 fn write_textures(place: &Path, textures: &[SourceTexture]) -> Result<Vec<TextureEntry>, DatasetError> {
     let folder = place.join("textures");
-    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+    make_folder(&folder)?;
     textures.iter().enumerate().map(|(index, source)| write_texture(&folder, index, source)).collect()
 }
 

@@ -105,6 +105,12 @@ pub const MAP_SIZES: std::ops::RangeInclusive<usize> = 64..=4096;
 /// The linear grey that a missing base colour scores as, and that the grey baseline writes.
 pub const GREY: f32 = 0.5;
 
+/// The perceptual roughness that replaces a missing map.
+pub const MISSING_ROUGHNESS: f32 = 0.5;
+
+/// The metallic that replaces a missing map.
+pub const MISSING_METALLIC: f32 = 0.0;
+
 /// One of a material's maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

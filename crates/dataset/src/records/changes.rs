@@ -50,7 +50,7 @@ impl BuildFolder {
     /// Notes that the scene is about to differ from what the manifest lists.
     pub fn note_change(&self, scene: &SceneId) -> Result<(), DatasetError> {
         let path = self.changed_folder();
-        std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
+        work_folder::make_folder(&path)?;
         let path = path.join(scene.as_str());
         Ok(std::fs::write(&path, "").map_err(FileError::io("write", path))?)
     }
@@ -209,7 +209,7 @@ impl SceneHashes {
     fn keep(&self) -> Result<(), DatasetError> {
         let list = BuildFolder::of(&self.root).hashes(&self.scene);
         let parent = list.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(parent).map_err(FileError::io("make", parent))?;
+        work_folder::make_folder(parent)?;
         // Without line breaks: nobody reads it, and a room has hundreds of files.
         let text = serde_json::to_string(&self.files).expect("names, numbers and hashes become JSON");
         Ok(write_whole(&list, text.as_bytes())?)

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::layout::BuildFolder;
 use crate::{DatasetError, RendererId, SceneId, json};
-use mateval_files::{FileError, work_folder};
+use mateval_files::work_folder;
 
 /// The format of this version of the file.
 const COST_FORMAT: &str = "mateval-cost/1";
@@ -102,7 +102,7 @@ pub fn timed<T, E: From<DatasetError>>(
 fn write(root: &Path, scene: &SceneId, steps: Vec<StepCost>) -> Result<(), DatasetError> {
     let path = BuildFolder::of(root).cost(scene);
     let folder = path.parent().unwrap_or(root);
-    std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+    work_folder::make_folder(folder)?;
     json::write(&path, &CostFile { format: COST_FORMAT.to_owned(), steps })
 }
 
@@ -144,6 +144,8 @@ fn ticks(stat: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
+    use mateval_files::FileError;
+
     use super::*;
 
     fn run(root: &Path, step: Step, is_alone: bool, works: bool) -> Result<(), DatasetError> {

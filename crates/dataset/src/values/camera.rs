@@ -103,7 +103,7 @@ impl Camera {
     }
 
     /// The camera turned by `x_deg` about its own X, then `y_deg` about its own Y: `R_new = R * Rx(dx) * Ry(dy)`, the
-    /// translation kept (the formula of the public MatEval code, see METHODS 1.1).
+    /// translation kept.
     pub fn turned(&self, x_deg: f64, y_deg: f64) -> Self {
         let turn = rotation_x(x_deg.to_radians()) * rotation_y(y_deg.to_radians());
         Self::from_rotation(self.rotation() * turn, self.position(), self.intrinsics)

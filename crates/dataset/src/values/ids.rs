@@ -1,6 +1,7 @@
 //! Ids of scenes, instances, parts, views and renderers, and the indices of instances and parts in pictures.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,13 @@ pub fn id_text_from(name: &str, fallback: &str) -> String {
         .collect();
     let trimmed: String = mapped.trim_matches(|c| c == '-' || c == '_').chars().take(48).collect();
     if trimmed.is_empty() { fallback.to_owned() } else { trimmed }
+}
+
+/// `name`, or the first of `name-2`, `name-3`, ... (with `separator`) that is not in `taken`, to which it is added.
+pub fn unused_name(name: &str, separator: char, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}{separator}{number}"));
+    let mut names = std::iter::once(name.to_owned()).chain(numbered);
+    names.find(|name| taken.insert(name.clone())).expect("taken names are finitely many")
 }
 
 /// A count with its noun: `1 scene`, `2 scenes`.
@@ -125,9 +133,16 @@ id_type!(
 );
 
 impl ViewId {
-    /// How the ids of views from other places than the input view's begin, and those of no other view. So a result,
-    /// which names a view by its id alone, says for which means it counts.
+    /// The input view's id.
+    pub const INPUT: &str = "input";
+
+    /// How the ids of views from other places than the input view's begin, and those of no other view. A result names
+    /// views by id alone; the prefix decides which means a view enters.
     pub const WIDE: &str = "wide_";
+
+    pub fn input() -> Self {
+        Self(Self::INPUT.to_owned())
+    }
 
     /// Whether it is the id of a view from another place than the input view's.
     pub fn is_wide(&self) -> bool {
@@ -162,6 +177,7 @@ mod tests {
         for bad in ["", "-a", "_a", "A", "a/b", "..", "a.b", "ä", &"x".repeat(65), "a\n"] {
             assert!(InstanceId::new(bad).is_err(), "{bad}");
         }
+        assert_eq!(ViewId::new(ViewId::INPUT), Ok(ViewId::input()));
     }
 
     #[test]
@@ -171,5 +187,12 @@ mod tests {
             assert_eq!(text, id);
             assert!(InstanceId::new(text).is_ok());
         }
+    }
+
+    #[test]
+    fn unused_names_are_unique() {
+        let mut taken = BTreeSet::new();
+        let ids = ["a", "a", "b", "a", "a-2"].map(|id| unused_name(id, '-', &mut taken));
+        assert_eq!(ids, ["a", "a-2", "b", "a-3", "a-2-2"]);
     }
 }

@@ -101,6 +101,11 @@ impl TriangleMesh {
     }
 }
 
+/// The least and the greatest corner of the points' bounding box; absent without points.
+pub fn bounds(points: impl Iterator<Item = Vec3>) -> Option<[Vec3; 2]> {
+    points.map(|point| [point; 2]).reduce(|[low, high], [point, _]| [low.min(point), high.max(point)])
+}
+
 /// The barycentric weights of the triangle's point nearest to `point`; they are not negative and add to one. A triangle
 /// without area counts as its edges.
 pub fn nearest_weights(corners: [DVec3; 3], point: DVec3) -> DVec3 {

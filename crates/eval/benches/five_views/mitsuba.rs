@@ -7,11 +7,8 @@ use std::process::Command;
 use mateval_dataset::Camera;
 use serde_json::{Value, json};
 
-use crate::FIT_SIZE;
-use crate::Run;
-use crate::SIZE;
-use crate::ours;
 use crate::stage::Stage;
+use crate::{FIT_SIZE, Run, SIZE, ours};
 
 /// Runs `tests/peers/five_views_mitsuba.py` once.
 pub fn run(

@@ -1,7 +1,6 @@
 //! The noise of pictures.
 
-use mateval_image::LinearRgb;
-use mateval_image::Picture;
+use mateval_image::{LinearRgb, Picture};
 
 /// The mean squared error of a tool's picture relative to the picture that it converges to.
 #[derive(Clone, Copy, Debug)]

@@ -5,15 +5,12 @@ use std::sync::Arc;
 
 use mateval_dataset::Camera;
 use mateval_image::{LinearRgb, Picture};
-use mateval_light::light_fit::FitRules;
-use mateval_light::light_fit::{FitTarget, fit_lights};
+use mateval_light::light_fit::{FitRules, FitTarget, fit_lights};
+use mateval_testkit::bench_scene;
 use mateval_tracer::{RenderSettings, ViewLight, World, render_views};
 
-use crate::FIT_SIZE;
-use crate::Run;
-use crate::SAMPLES;
 use crate::stage::Stage;
-use mateval_testkit::bench_scene;
+use crate::{FIT_SIZE, Run, SAMPLES};
 
 /// Samples a pixel of the pictures that the fit uses.
 pub const STREAM_C_SAMPLES: u32 = 16;

@@ -5,30 +5,35 @@
 //! is the other half. f clips above 1 and encodes to sRGB, f' is its slope.
 //!
 //! ```text
-//! r   = (clip(a_P) + 0.001) / (a_T + 0.001), at most 8      a_P, a_T: base colour in the view, from the atlases of both
+//! r   = (clip(a_P) + 0.001) / (a_T + 0.001), at most 8     a_P, a_T: base colour in the view, from the atlases of both
 //! b   = min(r, 1),   g = min(r, 2)
 //! m_i = b R + (q_i - b t_i);   m_h = the mean of its quarters
 //! F_o = filter(m_o - g R), by the noise of its quarters
-//! k_o = sum clip(m_o, 0, 1) / sum clip(r R, 0, 1), each value clipped, over the valid pixels and channels, within 0.1 to 10
+//! k_o = sum clip(m_o, 0, 1) / sum clip(r R, 0, 1), each value clipped, over the valid pixels and channels,
+//!       within 0.1 to 10
 //! p_h = g R + F_o, limited to k_o r R / 2 ... 2 k_o r R
 //! s_h = f'(p_h), 0 where p_h >= 1;   p'_h = clip(p_h, 0, 1)
 //! X_h = f(p'_h) + s_h (m_h - p'_h) - f(R);   u_h = s_h times half the difference of the quarters
 //! ```
 //!
-//! r R is what the prediction would show if light between surfaces did not change. b is r, but at most 1, since a larger
-//! factor would enlarge the truth's noise; g R is the part of r R that the filter need not carry, bounded because r is
-//! large only where the truth is dark, and R's own noise would be enlarged with it. Encoding is a curve, so the mean of
-//! encoded noise is not the encoded mean. Here the curve is replaced by its tangent at a pivot p that half h does not
-//! know: X_h is linear in m_h, and its mean is the encoded mean as far as the pivot is right. m_i is a control variate
-//! (Owen, "Monte Carlo theory, methods and examples", section 8.9) that moves no expectation, whatever r is, as far as R
-//! is the mean of t. For the true maps q = t and r = 1, so that m = R, F = 0, k = 1 and X = 0: exactly, at any number of
-//! paths.
+//! r R is what the prediction would show if light between surfaces did not change. b is r, but at most 1, since a
+//! larger factor would enlarge the truth's noise; g R is the part of r R that the filter need not carry, bounded
+//! because r is large only where the truth is dark, and R's own noise would be enlarged with it. Encoding is a curve,
+//! so the mean of encoded noise is not the encoded mean. Here the curve is replaced by its tangent at a pivot p that
+//! half h does not know: X_h is linear in m_h, and its mean is the encoded mean as far as the pivot is right. m_i is a
+//! control variate (Owen, "Monte Carlo theory, methods and examples", section 8.9) that moves no expectation, whatever
+//! r is, as far as R is the mean of t. For the true maps q = t and r = 1, so that m = R, F = 0, k = 1 and X = 0:
+//! exactly, at any number of paths.
 
 use mateval_image::transfer::srgb_with_slope;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_tracer::noise_filter::{Surfaces, filtered_mean};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::metric::ColorPicture;
+use crate::truth::ViewTruth;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -65,6 +70,29 @@ pub struct ViewGuide<'a> {
     pub ratio: &'a Picture<LinearRgb>,
     /// What the filter may average.
     pub surfaces: Surfaces<'a>,
+}
+
+/// What is known of each view of a prediction in one lighting.
+pub(crate) struct ViewGuides<'a> {
+    pub(crate) truths: &'a [ViewTruth],
+    /// r.
+    pub(crate) ratios: &'a [Picture<LinearRgb>],
+    /// R, exposed.
+    pub(crate) references: &'a [ColorPicture],
+}
+
+impl ViewGuides<'_> {
+    pub(crate) fn of(&self, view: usize) -> ViewGuide<'_> {
+        let ViewTruth { instances, normals, valid, .. } = &self.truths[view];
+        let surfaces = Surfaces { base_color: None, instances, normals, valid };
+        ViewGuide { reference: &self.references[view].linear, ratio: &self.ratios[view], surfaces }
+    }
+
+    /// The difference in every view, from its four quarters.
+    pub(crate) fn differences(&self, quarters: &[Vec<Picture<LinearRgb>>]) -> Vec<LightDifference> {
+        let views = quarters.par_iter().enumerate();
+        views.map(|(view, quarters)| difference([0, 1, 2, 3].map(|at| &quarters[at]), &self.of(view))).collect()
+    }
 }
 
 /// The difference of a prediction's view from the reference, encoded.

@@ -15,17 +15,16 @@ use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, exr_io};
 use mateval_light::light_fit::{FitTarget, TwoStreamFit, fit_two_streams};
 use mateval_light::light_stage;
 use mateval_light::photo_pixels::{PhotoRules, exposure_factor};
-use mateval_metrics::alignment::scaled;
+use mateval_metrics::scaled;
 use mateval_tracer::{LightBasis, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::light::difference::{LightDifference, encoded, guided_mean, mean_of};
-use crate::light::own_lights::{LitSink, LitViews, ViewGuides};
+use crate::light::difference::{LightDifference, ViewGuides, encoded, guided_mean, mean_of};
 use crate::light::shared_paths::{SharedPaths, batches, picture_of};
 use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
-use crate::scene::{BaseColors, SceneTask};
+use crate::scene::{BaseColors, LitSink, LitViews, SceneTask};
 use crate::truth::{ViewTruth, photo_of_renderer, sized};
 
 /// What renders under fitted lights are compared with, by view.

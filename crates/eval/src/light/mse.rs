@@ -2,9 +2,10 @@
 //!
 //! Noise of few samples adds its variance to a squared error. Two independent halves avoid that: with X and Y the
 //! encoded difference of either half from the reference ([`super::difference`]), the expectation of the mean of X*Y is
-//! the squared true difference, whatever the noise of the paths. Each half consists of two quarters. Half of their
-//! difference, encoded as X (or Y) is, has the half's noise and nothing else: u (or v). Pixels whose noise is correlated
-//! form a block ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)).
+//! the squared true difference, whatever the noise of the paths, as far as the pivot is right. Each half consists of
+//! two quarters. Half of their difference, encoded as X (or Y) is, has the half's noise and nothing else: u (or v), of
+//! the same variance as the noise of X, independent of Y. Pixels whose noise is correlated form a block
+//! ([`noise_blocks`](mateval_tracer::shared_centre::noise_blocks)).
 //!
 //! ```text
 //! S = sum over blocks of (Σ Y u)² + (Σ X v)²,   P = sum over blocks of (Σ u v)²
@@ -42,8 +43,8 @@ pub struct LightMse {
     pub common: f64,
 }
 
-/// Σ Y u, Σ X v and Σ u v over one block, each divided by the number of all values that count. Their unit is that of the
-/// MSE.
+/// Σ Y u, Σ X v and Σ u v over one block, each divided by the number of all values that count. Their unit is that of
+/// the MSE.
 pub type BlockSums = [f64; 3];
 
 fn variance<'a>(blocks: impl Iterator<Item = &'a BlockSums>, common: f64) -> f64 {
@@ -57,7 +58,8 @@ fn variance<'a>(blocks: impl Iterator<Item = &'a BlockSums>, common: f64) -> f64
 
 impl LightMse {
     /// The error over the pixels of the mask and their channels; absent if no pixel counts. `block_ids` holds the
-    /// block of each pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not finite.
+    /// block of each pixel. One block may occur in several views ([`mean_psnr_error`]). Fails where a value is not
+    /// finite.
     pub fn new(
         difference: &LightDifference,
         mask: &Mask,

@@ -3,37 +3,17 @@
 use mateval_dataset::Camera;
 use mateval_dataset::lighting::{LightingName, light_of, lightings, weighted};
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_light::light_fit::FittedRadiances;
 use mateval_tracer::emitter::group_shares::shares_for;
-use mateval_tracer::noise_filter::Surfaces;
 use mateval_tracer::{LightMix, ViewsRender, World};
-use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::light::difference::{LightDifference, ViewGuide, corrected_quarter, difference};
+use crate::light::difference::{ViewGuides, corrected_quarter};
 use crate::light::reference::StoredReference;
 use crate::light::shared_paths::{QUARTERS, SharedPaths, ViewQuarters, batches, picture_of};
 use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
-use crate::scene::{BaseColors, SceneTask};
+use crate::scene::{BaseColors, LitSink, LitViews, SceneTask};
 use crate::truth::{ViewTruth, true_maps};
-
-/// The views of a prediction under one light, compared with the reference.
-pub(crate) struct LitViews<'a> {
-    pub(crate) track: Track,
-    pub(crate) lighting: Option<LightingName>,
-    /// What it is compared with, by view.
-    pub(crate) references: &'a [ColorPicture],
-    pub(crate) views: Vec<LightDifference>,
-    /// For fitted lights, the views under the lights of each of two fits.
-    pub(crate) of_fits: Option<[Vec<LightDifference>; 2]>,
-    pub(crate) fit: Option<FittedRadiances>,
-    /// Contributions of light that were not finite and count as none.
-    pub(crate) not_finite: u64,
-}
-
-/// Takes the views of a prediction, by its number.
-pub(crate) type LitSink<'a> = dyn FnMut(usize, LitViews<'_>) -> Result<(), EvalError> + 'a;
 
 struct OwnLighting {
     track: Track,
@@ -57,6 +37,7 @@ pub(super) fn compare_under_own_lights(
     let (lightings, group_light) = own_lightings(task, reference, protocol)?;
     let mixes: Vec<LightMix> = lightings.iter().map(|lighting| lighting.mix.clone()).collect();
     let input = task.input_view()?;
+    // Other shares of samples than R has: the expectation is the same, and the noise is less.
     let world: World = task.open.world.with_group_shares(&input.camera, &shares_for(&mixes, &group_light));
     let (scene, atlases, progress) = (&task.scene.id, &task.open.atlases, task.progress);
     let paths = SharedPaths { scene, world: &world, atlases, rules, pass: task.set.pass("own"), progress };
@@ -68,14 +49,16 @@ pub(super) fn compare_under_own_lights(
         let guides = ViewGuides { truths, ratios, references: &lighting.references };
         if let Some(kept) = task.pictures {
             for (at, (view, quarters)) in task.views.iter().zip(&quarters).enumerate() {
-                kept.keep_light(index, (scene, &view.id), lighting.name, quarters, &guides.of(at))?;
+                let light = (lighting.track, lighting.name);
+                kept.keep_light(index, (scene, &view.id), light, quarters, &guides.of(at))?;
             }
         }
         let OwnLighting { track, name, references, .. } = lighting;
-        let (track, lighting, views) = (*track, *name, guides.differences(quarters));
+        let (track, lighting, views) = (*track, *name, guides.differences(&quarters));
         each(index, LitViews { track, lighting, references, views, of_fits: None, fit: None, not_finite })
     };
-    // Where a prediction is the truth texel by texel, every m is R (see `difference`), so no path is traced.
+    // Where a prediction is the truth texel by texel, every m is R (see `difference`), so no path is traced. The same
+    // values stored otherwise are traced and give the same.
     let is_truth = |&index: &usize| task.predictions[index].materials == truth.materials;
     let (exact, traced): (Vec<usize>, Vec<usize>) = (0..task.predictions.len()).partition(is_truth);
     for index in exact {
@@ -92,7 +75,7 @@ pub(super) fn compare_under_own_lights(
         let mixes = vec![mixes.clone(); repaint.predictions()];
         let ratios: Vec<Vec<Picture<LinearRgb>>> = batch.iter().map(|&index| base_colors.ratios(index)).collect();
         let corrected = |renders: &[ViewsRender], prediction: usize, lighting: usize, view: usize| {
-            // It is the last.
+            // The truth travels last.
             let [own, truth] = [prediction, batch.len()].map(|at| picture_of(&renders[at], view, lighting));
             let (reference, ratio) = (&lightings[lighting].references[view].linear, &ratios[prediction][view]);
             corrected_quarter(own, truth, task.scene.exposure, reference, ratio)
@@ -139,26 +122,4 @@ fn own_lightings(
         }
     }
     Ok((all, group_light))
-}
-
-/// What is known of each view of a prediction in one lighting.
-pub(crate) struct ViewGuides<'a> {
-    pub(crate) truths: &'a [ViewTruth],
-    /// r.
-    pub(crate) ratios: &'a [Picture<LinearRgb>],
-    /// R, exposed.
-    pub(crate) references: &'a [ColorPicture],
-}
-
-impl ViewGuides<'_> {
-    pub(crate) fn of(&self, view: usize) -> ViewGuide<'_> {
-        let ViewTruth { instances, normals, valid, .. } = &self.truths[view];
-        let surfaces = Surfaces { base_color: None, instances, normals, valid };
-        ViewGuide { reference: &self.references[view].linear, ratio: &self.ratios[view], surfaces }
-    }
-
-    pub(crate) fn differences(&self, quarters: ViewQuarters) -> Vec<LightDifference> {
-        let views = quarters.par_iter().enumerate();
-        views.map(|(view, quarters)| difference([0, 1, 2, 3].map(|at| &quarters[at]), &self.of(view))).collect()
-    }
 }

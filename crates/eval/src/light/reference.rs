@@ -25,14 +25,13 @@ use mateval_tracer::Lighting;
 use crate::error::EvalError;
 use crate::light::difference::{encoded, mean_of};
 use crate::light::shared_paths::SharedPaths;
-use crate::open_scene::{OpenScene, ViewSet};
 use crate::protocol::Protocol;
-use crate::truth::{sized, true_maps};
+use crate::truth::{OpenScene, ViewSet, sized, true_maps};
 
 /// Rises whenever the pictures could change for the same inputs.
 pub const REFERENCE_VERSION: u32 = 1;
 
-/// The samples of a release, per pixel of each half.
+/// The samples of a release, per pixel of each half. Scoring accepts any number; the manifest's hashes pin the pictures.
 pub const RELEASE_SAMPLES: u32 = 256;
 
 #[derive(Clone, Debug)]
@@ -102,7 +101,7 @@ fn make(dataset: &Dataset, scene: &SceneFile, samples: u32, progress: Progress<'
         variance: BTreeMap::new(),
         files: BTreeMap::new(),
     };
-    // The only protocol that compares with R.
+    // `mateval-3` is the only protocol that compares with R.
     let rules = &Protocol::named("mateval-3")?.light;
     let truth = true_maps(&folder, scene)?;
     // The views of a set share paths.

@@ -13,14 +13,14 @@ use crate::error::EvalError;
 use crate::light::difference::LightDifference;
 use crate::light::fitted_lights::{Photos, compare_under_fitted_lights};
 use crate::light::mse::LightMse;
-use crate::light::own_lights::{LitSink, LitViews, compare_under_own_lights};
+use crate::light::own_lights::compare_under_own_lights;
 use crate::materials::score::measure_whole_view;
 use crate::metric::{EncodedPair, Metric, PictureKind};
 use crate::protocol::{Protocol, Track};
 use crate::result::PictureValues;
 use crate::result::key::{Region, Surfaces};
-use crate::scene::{BaseColors, MaskedRegion, SceneTask, ScoreSheet, regions};
-use crate::truth::ViewTruth;
+use crate::scene::{BaseColors, LitSink, LitViews, MaskedRegion, SceneTask, ScoreSheet, SeenLight, regions};
+use crate::truth::{ViewSet, ViewTruth};
 
 /// Scores every submission under the lights of protocol number `at`.
 pub(crate) fn score_light(
@@ -32,7 +32,10 @@ pub(crate) fn score_light(
 ) -> Result<(), EvalError> {
     let protocol = &task.protocols[at];
     let meter = LightMeter::new(task, truths, truths.iter().map(regions).collect(), protocol);
-    let mut each = |submission: usize, lit: LitViews| meter.measure(&lit, &mut sheets[submission][at]);
+    let mut each = |submission: usize, lit: LitViews| {
+        meter.show(submission, &lit)?;
+        meter.measure(&lit, &mut sheets[submission][at])
+    };
     compare_under_lights(task, truths, base_colors, protocol, &mut each)
 }
 
@@ -55,8 +58,8 @@ pub(crate) fn compare_under_lights(
     Ok(())
 }
 
-/// Scores every submission against the photos of a captured scene, by protocol number `at`. Its lights are fitted to the
-/// input photo.
+/// Scores every submission against the photos of a captured scene, by protocol number `at`. Its lights are fitted to
+/// the input photo.
 pub(crate) fn score_photos(
     task: &SceneTask<'_>,
     rules: &PhotoRules,
@@ -121,6 +124,24 @@ impl<'a> LightMeter<'a> {
         sheet.score.not_finite += lit.not_finite;
         if lit.track != Track::Relit {
             self.add_instance_errors(kind, &lit.views, sheet);
+        }
+        Ok(())
+    }
+
+    /// Passes the views from the input view's place, relit ones excepted, to the plan's sink.
+    fn show(&self, submission: usize, lit: &LitViews<'_>) -> Result<(), EvalError> {
+        let is_shown = lit.track != Track::Relit && self.task.set == ViewSet::Turned;
+        let Some(seen) = self.task.seen.filter(|_| is_shown) else { return Ok(()) };
+        for (at, view) in self.task.views.iter().enumerate() {
+            seen(&SeenLight {
+                submission,
+                scene: &self.task.scene.id,
+                view: &view.id,
+                kind: lit.track.picture(),
+                valid: &self.truths[at].valid,
+                reference: &lit.references[at].encoded,
+                prediction: &lit.views[at].shown,
+            })?;
         }
         Ok(())
     }

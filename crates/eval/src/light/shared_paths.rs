@@ -1,18 +1,17 @@
 //! Renders of predictions that share paths.
 //!
 //! Predictions that agree in roughness and metallic differ in base colour alone, on which no decision along a path
-//! depends: they travel along the same paths, each with its own colours. So does the truth, also where its roughness and
-//! metallic are others: directions then come from both densities in equal parts, and each of both is weighted by its
-//! own. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
+//! depends: they travel along the same paths, each with its own colours. So does the truth, also where its roughness
+//! and metallic are others: directions then come from both densities in equal parts, and each of both is weighted by
+//! its own. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
 
 use std::collections::BTreeMap;
 
-use mateval_dataset::{Camera, Progress, Report, SceneId, TriangleMesh};
-use mateval_files::untrusted::sha256_of_bytes;
+use mateval_dataset::{Camera, Progress, Report, SceneId, TriangleMesh, splitmix64};
 use mateval_image::{LinearRgb, Picture};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_tracer::{
-    Coat, LightMix, Lighting, RenderSettings, Repaint, Scattering, ViewsRender, World, render_repainted,
+    LightMix, Lighting, RenderSettings, Repaint, Scattering, SurfaceMaps, ViewsRender, World, render_repainted,
 };
 use rayon::prelude::*;
 
@@ -59,8 +58,8 @@ impl SharedPaths<'_> {
     }
 
     /// The quarters of the first `predictions` that travel, by prediction, light mix and view, and the number of
-    /// contributions of each that were not finite. A quarter has half the samples of a half.
-    /// `picture` makes the picture of (prediction, mix, view) from one stream's renders of everything that travels.
+    /// contributions of each that were not finite. A quarter has half the samples of a half, rounded down, but one at the
+    /// least. `picture` makes the picture of (prediction, mix, view) from one stream's renders of everything that travels.
     pub(crate) fn quarters(
         &self,
         repaint: &Repaint,
@@ -87,8 +86,7 @@ impl SharedPaths<'_> {
 
     /// The seed of one stream, the same for every prediction.
     pub(crate) fn seed(&self, stream: &str) -> u64 {
-        let text = format!("{}/{}/{}/{stream}", self.rules.samples.seed, self.scene, self.pass);
-        u64::from_str_radix(&sha256_of_bytes(text.as_bytes())[..16], 16).expect("a hash is hexadecimal")
+        splitmix64::seed_of(&format!("{}/{}/{}/{stream}", self.rules.samples.seed, self.scene, self.pass))
     }
 
     /// The materials that travel together. Predictions agree in roughness and metallic; those of the truth may be
@@ -104,13 +102,16 @@ impl SharedPaths<'_> {
             let PredictedMaterial { roughness, metallic, .. } = scene.materials[surface].clone()?;
             Some(Scattering { roughness, metallic })
         };
-        let coat = |surface: usize| {
+        let maps = |surface: usize| {
             let base_colors = all.iter().map(|scene| Some(scene.materials[surface].as_ref()?.base_color.clone()));
-            Some(Coat { base_colors: base_colors.collect::<Option<_>>()?, scattering: scattering(first, surface)? })
+            Some(SurfaceMaps {
+                base_colors: base_colors.collect::<Option<_>>()?,
+                scattering: scattering(first, surface)?,
+            })
         };
         let surfaces = 0..self.atlases.len();
-        let coats = surfaces.clone().map(coat).collect();
-        let repaint = Repaint::new(self.world, self.atlases, coats, self.rules.flavour)?;
+        let maps = surfaces.clone().map(maps).collect();
+        let repaint = Repaint::new(self.world, self.atlases, maps, self.rules.flavour)?;
         match truth.filter(|truth| truth.scattering_key != first.scattering_key) {
             None => Ok(repaint),
             Some(truth) => {

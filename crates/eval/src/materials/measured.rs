@@ -1,4 +1,5 @@
-//! Predictions compared with measured colours: the mean of the predicted base colour over each measured region of a view.
+//! Predictions compared with measured colours: the mean of the predicted base colour over each measured region of a
+//! view.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +9,7 @@ use mateval_dataset::measured::{MeasuredFile, MeasuredRegion, color_fault};
 use mateval_dataset::{SceneId, ViewId, json};
 use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_metrics::measured::{RegionColors, color_difference, maw_mask, maw_picture, measurement_delta_e};
+use mateval_metrics::measured::{RegionColors, maw_mask, maw_picture, measured_difference, measurement_delta_e};
 use mateval_submission::prediction::PredictedScene;
 
 use crate::error::EvalError;
@@ -74,12 +75,8 @@ fn colors<'a>(
 }
 
 impl SceneTask<'_> {
-    /// Compares every submission with the measured colours, under the protocols that are `wanted` by their numbers.
-    pub(crate) fn score_measured(
-        &self,
-        wanted: &impl Fn(usize) -> bool,
-        sheets: &mut [Vec<ScoreSheet>],
-    ) -> Result<(), EvalError> {
+    /// Compares every submission with the measured colours, under the `protocols` of these numbers.
+    pub(crate) fn score_measured(&self, protocols: &[usize], sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
         let measured = Measured::read(&self.open.folder, &self.views)?;
         let predictions: Vec<&PredictedScene> = self.predictions.iter().collect();
         for view in &self.views {
@@ -94,7 +91,7 @@ impl SceneTask<'_> {
                 let maw = sums(&small, &maw, |rgb: [u8; 3]| rgb.map(|byte| f64::from(linear_from_srgb_byte(byte))));
                 let maw: Vec<RegionColors> = colors(of_view(), &maw).into_iter().map(|(_, colors)| colors).collect();
                 let (values, listed) = values(&self.scene.id, view, &whole, &maw);
-                for at in (0..self.protocols.len()).filter(|at| wanted(*at)) {
+                for &at in protocols {
                     sheets[at].score.pictures.push(values.clone());
                     sheets[at].score.measured.extend(listed.clone());
                 }
@@ -130,7 +127,7 @@ fn values(
         pixels: colors.pixels,
         predicted: colors.predicted,
         measured: colors.measured,
-        delta_e: color_difference(colors.predicted, colors.measured),
+        delta_e: measured_difference(colors.predicted, colors.measured),
         measurement_delta_e: region.standard_error.map(|error| measurement_delta_e(region.color, error)),
     });
     (values, listed.collect())

@@ -12,7 +12,7 @@ use mateval_tracer::aov::{
 };
 use rayon::prelude::*;
 
-use crate::open_scene::OpenScene;
+use crate::truth::OpenScene;
 
 /// A submission's maps as a view shows them; each pixel is a mean over its sub-pixels.
 #[derive(Clone, Debug, PartialEq)]

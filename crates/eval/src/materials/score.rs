@@ -4,8 +4,7 @@
 use mateval_dataset::Report;
 use mateval_dataset::dataset::View;
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_metrics::alignment::{channel_scales, scaled};
-use mateval_metrics::{Lpips, MetricError, Psnr, mse};
+use mateval_metrics::{Lpips, MetricError, Psnr, channel_scales, mse, scaled};
 use mateval_submission::prediction::PredictedScene;
 use rayon::prelude::*;
 
@@ -48,12 +47,23 @@ struct Truth<'a> {
 type EachView<'a> = dyn FnMut(&View, usize, &[MaterialPictures], &Picture<LinearRgb>) -> Result<(), EvalError> + 'a;
 
 impl SceneTask<'_> {
-    /// Pictures of base colour, roughness and metallic, under the protocols that are `wanted` by their numbers. Returns
-    /// the base colours of the true atlases and of each submission.
+    /// Errors of texels; they are the same under every protocol.
+    pub(crate) fn score_texels(&self, sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
+        let found = texture_space(self.open, self.scene, self.predictions, self.pictures, self.progress)?;
+        for (sheets, errors) in sheets.iter_mut().zip(found) {
+            for sheet in sheets {
+                sheet.score.texels = errors.clone();
+            }
+        }
+        Ok(())
+    }
+
+    /// Pictures of base colour, roughness and metallic, under the `protocols` of these numbers. Returns the
+    /// base colours of the true atlases and of each submission.
     pub(crate) fn score_materials(
         &self,
         truths: &[ViewTruth],
-        wanted: &(impl Fn(usize) -> bool + Sync),
+        protocols: &[usize],
         sheets: &mut [Vec<ScoreSheet>],
     ) -> Result<BaseColors, EvalError> {
         self.each_view(&mut |view, at, pictures, true_base_color| {
@@ -66,8 +76,8 @@ impl SceneTask<'_> {
             let predicted: Vec<Predicted> =
                 pictures.par_iter().map(|pictures| Predicted::new(pictures.clone(), truth)).collect();
             let truth = Truth { view: truth, albedo: ColorPicture::new(truth.albedo.clone()), regions: regions(truth) };
-            let protocols = (0..self.protocols.len()).filter(|&p| wanted(p));
-            let jobs: Vec<(usize, usize)> = protocols.flat_map(|p| (0..sheets.len()).map(move |s| (s, p))).collect();
+            let jobs: Vec<(usize, usize)> =
+                protocols.iter().flat_map(|&p| (0..sheets.len()).map(move |s| (s, p))).collect();
             let measured: Vec<_> = jobs
                 .par_iter()
                 .map(|&(s, p)| self.material_values(&self.protocols[p], view, &predicted[s], &truth))
@@ -147,21 +157,6 @@ impl SceneTask<'_> {
         }
         Ok(all)
     }
-
-    /// Errors of texels; they are the same under every protocol.
-    pub(crate) fn score_texels(&self, sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
-        let found = texture_space(self.open, self.scene, self.predictions, self.pictures, self.progress)?;
-        for (sheets, errors) in sheets.iter_mut().zip(found) {
-            for sheet in sheets {
-                sheet.score.texels = errors.clone();
-            }
-        }
-        Ok(())
-    }
-}
-
-fn mean_square([a, b]: [[f32; 3]; 2]) -> f64 {
-    (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
 }
 
 /// MSE and PSNR of an albedo picture over the mask. Where the mask holds the `whole` view, also the metrics of whole
@@ -198,6 +193,10 @@ pub fn albedo_mse(
         AlbedoSpace::Linear => mse(&prediction.linear, &reference.linear, Some(mask)),
         AlbedoSpace::Srgb => mse(&prediction.encoded, &reference.encoded, Some(mask)),
     }
+}
+
+fn mean_square([a, b]: [[f32; 3]; 2]) -> f64 {
+    (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
 }
 
 /// Adds the metrics of whole views that the picture's kind has. Renders have no linear prediction.

@@ -20,10 +20,9 @@ use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_submission::texel_map::TexelMap;
 
 use crate::error::EvalError;
-use crate::open_scene::OpenScene;
 use crate::pictures_dir::PicturesDir;
 use crate::result::{InstanceTexelErrors, TexelErrors};
-use crate::truth::true_material;
+use crate::truth::{OpenScene, true_material};
 
 /// Weighted squared errors over the observed, or the unobserved, texels of one or several instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,8 +46,8 @@ impl TexelSums {
     }
 }
 
-/// Calls `work` for every instance that has an atlas, in the scene's order, with its place, its texels and its true maps.
-/// Fails where the truth cannot be read or `scene.json` is unsound.
+/// Calls `work` for every instance that has an atlas, in the scene's order, with its place, its texels and its true
+/// maps. Fails where the truth cannot be read or `scene.json` is unsound.
 pub(crate) fn each_atlas(
     open: &OpenScene,
     scene: &SceneFile,
@@ -94,8 +93,8 @@ pub fn texture_space(
     Ok(compared)
 }
 
-/// The texels a side of an instance's atlas; absent if it has none. The sizes that a submission may have bound the memory
-/// of the truth, too.
+/// The texels a side of an instance's atlas; absent if it has none. The sizes that a submission may have bound the
+/// memory of the truth, too.
 pub(crate) fn checked_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>, EvalError> {
     let Some(size) = instance.atlas.as_ref().map(|atlas| atlas.size as usize) else { return Ok(None) };
     if MAP_SIZES.contains(&size) {

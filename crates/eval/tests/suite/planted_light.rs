@@ -9,13 +9,13 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::{Camera, TriangleMesh, glb, reference};
 use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Picture};
-use mateval_light::light_fit::FitRules;
-use mateval_light::light_fit::{FitTarget, fit_lights};
+use mateval_light::light_fit::{FitRules, FitTarget, fit_lights};
 use mateval_light::light_stage::{self, NamedLight};
 use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
-    Coat, LightBasis, LightMix, Lighting, RenderSettings, Repaint, Scattering, StageLight, World, render_repainted,
+    LightBasis, LightMix, Lighting, RenderSettings, Repaint, Scattering, StageLight, SurfaceMaps, World,
+    render_repainted,
 };
 
 use super::sample::{dataset, hasty, write_truth};
@@ -58,7 +58,7 @@ fn basis_of(
     seed: u64,
 ) -> LightBasis {
     let coat = |surface: usize| {
-        prediction.materials[surface].as_ref().map(|material| Coat {
+        prediction.materials[surface].as_ref().map(|material| SurfaceMaps {
             base_colors: vec![material.base_color.clone()],
             scattering: Scattering { roughness: material.roughness.clone(), metallic: material.metallic.clone() },
         })

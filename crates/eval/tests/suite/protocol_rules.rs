@@ -9,8 +9,7 @@ use mateval_dataset::lighting::lightings;
 use mateval_dataset::open::Dataset;
 use mateval_eval::EvalError;
 use mateval_eval::metric::Metric;
-use mateval_eval::protocol::Protocol;
-use mateval_eval::protocol::Track;
+use mateval_eval::protocol::{Protocol, Track};
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::score::{ScorePlan, score};
 use mateval_light::light_stage;
@@ -101,7 +100,7 @@ fn find_leaves(value: &Value, at: String, found: &mut Vec<String>) {
 /// `mateval-3` with all tracks, so that every rule is read, and so few samples that it is computed in a moment.
 fn quick() -> Protocol {
     let mut protocol = hasty();
-    protocol.light.tracks = vec![Track::Fitted, Track::True, Track::Relit];
+    protocol.light.tracks = Track::ALL.to_vec();
     protocol.light.fit.samples = 2;
     protocol.light.samples.each_half = 2;
     protocol

@@ -1,4 +1,5 @@
-//! The truth is exact under every light at any number of samples, and the error that is stated for others is the spread.
+//! The truth is exact under every light at any number of samples, and the error that is stated for others is the
+//! spread.
 
 #![allow(clippy::print_stdout, reason = "measurements are printed")]
 
@@ -43,8 +44,8 @@ fn write_floats(out: &Path) {
     assert!(count > 10, "{count}");
 }
 
-/// For a copy of the truth no path is traced. The truth as floats is another submission for the scorer, so that its paths
-/// are traced, and the difference is zero all the same.
+/// For a copy of the truth no path is traced. The truth as floats is another submission for the scorer, so that its
+/// paths are traced, and the difference is zero all the same.
 #[test]
 fn the_truth_is_exact_at_any_number_of_samples() {
     let [truth, floats] = ["gt", "floats"].map(|name| kept_folder("exact").join(name));
@@ -82,8 +83,8 @@ fn the_truth_is_exact_at_any_number_of_samples() {
 /// Independent seeds.
 const SEEDS: usize = 10;
 
-/// Over the whole chain of `room`, whose lamps are small and whose surfaces are mirrors, metal and glass: for each kind of
-/// submission and mean, the stated error is the spread over seeds, and the mean that of many samples.
+/// Over the whole chain of `room`, whose lamps are small and whose surfaces are mirrors, metal and glass: for each kind
+/// of submission and mean, the stated error is the spread over seeds, and the mean that of many samples.
 #[test]
 fn the_stated_error_is_the_spread() {
     let folder = kept_folder("spread");

@@ -147,7 +147,7 @@ impl Writer<'_, '_> {
             ScalarInput::Texture { texture, channel, .. } if !takes_texture => {
                 let message = "Mitsuba's `roughplastic` takes no texture as its alpha";
                 self.warn("alpha_texture", message, "wrote the mean of the texture");
-                Ok(bsdf.float("alpha", self.files.mean(texture.0, *channel)))
+                Ok(bsdf.float("alpha", self.files.textures[texture.0].mean()[*channel] as f32))
             }
             alpha => self.files.scalar(bsdf, "alpha", alpha),
         }
@@ -208,14 +208,6 @@ impl<'a> TextureFiles<'a> {
                 parent.child(self.bitmap(name, texture.0, Some(*channel), uv)?)
             }
         })
-    }
-
-    /// The mean of all texels of a channel.
-    pub(super) fn mean(&self, texture: usize, channel: usize) -> f32 {
-        let texture = &self.textures[texture];
-        let (width, height) = (texture.width(), texture.height());
-        let sum: f64 = (0..width * height).map(|k| f64::from(texture.texel(k % width, k / width)[channel])).sum();
-        (sum / (width * height) as f64) as f32
     }
 
     fn bitmap(

@@ -17,6 +17,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use mateval_dataset::material::Material;
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::{ReferenceScene, Surface};
 use mateval_dataset::{Camera, Finding, SceneId, ViewId, reference};
@@ -179,10 +180,7 @@ fn write_surface(
 
 /// The diagonal of the surface's bounding box, in metres.
 fn extent(surface: &Surface) -> f32 {
-    let positions = || surface.mesh.positions.iter().copied();
-    let low = positions().reduce(glam::Vec3::min).unwrap_or_default();
-    let high = positions().reduce(glam::Vec3::max).unwrap_or_default();
-    (high - low).length()
+    bounds(surface.mesh.positions.iter().copied()).map_or(0.0, |[low, high]| (high - low).length())
 }
 
 /// The path tracer. Mitsuba's `max_depth` also counts the camera's ray and the last direct light, hence 2 more.
@@ -244,11 +242,12 @@ mod tests {
     use mateval_dataset::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, SourceTexture, SurfaceIndex};
     use mateval_dataset::{Intrinsics, Severity, TriangleMesh};
     use mateval_image::{LinearRgb, Texels, Wrap, exr_io};
+    use mateval_testkit::scenes::quad;
 
     use super::*;
 
-    /// The direction of the picture's corner, computed here from the matrix and field of view as Mitsuba does (PEERS
-    /// B3: +Z ahead, +X left), equals that of our camera.
+    /// The direction of the picture's corner, computed here from the matrix and field of view as Mitsuba does (+Z
+    /// ahead, +X left), equals that of our camera.
     #[test]
     fn the_corner_pixel_looks_the_same_way() {
         let intrinsics = Intrinsics::from_fov_x(64, 48, 1.1);
@@ -264,13 +263,8 @@ mod tests {
 
     const GREY: ColorInput = ColorInput::Constant([0.5; 3]);
 
-    fn square(normals: bool) -> TriangleMesh {
-        TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y],
-            normals: normals.then(|| vec![Vec3::Z; 4]),
-            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        }
+    fn square() -> TriangleMesh {
+        TriangleMesh { normals: Some(vec![Vec3::Z; 4]), ..quad(Vec3::ZERO, Vec3::X, Vec3::Y) }
     }
 
     fn material(model: MaterialModel) -> Material {
@@ -281,7 +275,7 @@ mod tests {
     fn scene(materials: Vec<Material>) -> ReferenceScene {
         let texels = Texels::Grey8(vec![0, 51, 102, 255]);
         let texture = Texture::new(2, 2, texels, Wrap::Mirror).unwrap();
-        let surface = |k: usize| Surface { name: "s".to_owned(), mesh: square(true), material: MaterialIndex(k) };
+        let surface = |k: usize| Surface { name: "s".to_owned(), mesh: square(), material: MaterialIndex(k) };
         ReferenceScene {
             surfaces: (0..materials.len()).map(surface).collect(),
             materials,

@@ -109,17 +109,12 @@ fn ply_header(vertices: usize, faces: usize, normals: bool, uvs: bool) -> String
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
+    use mateval_testkit::scenes::quad;
 
     use super::*;
 
     fn square() -> TriangleMesh {
-        TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y],
-            normals: Some(vec![-Vec3::Z; 4]),
-            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        }
+        TriangleMesh { normals: Some(vec![-Vec3::Z; 4]), ..quad(Vec3::ZERO, Vec3::X, Vec3::Y) }
     }
 
     /// The corners of each face, as positions.

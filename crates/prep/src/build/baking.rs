@@ -152,18 +152,14 @@ mod tests {
     use glam::Vec3;
     use mateval_dataset::material::{ColorInput, MaterialModel, TextureIndex, UvTransform};
     use mateval_image::{Texels, Wrap};
+    use mateval_testkit::scenes::quad;
 
     use crate::atlas::{SizeWish, unwrap};
 
     use super::*;
 
     fn wall() -> TriangleMesh {
-        TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 1.0, 0.0), Vec3::Y],
-            normals: None,
-            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        }
+        quad(Vec3::ZERO, Vec3::X * 2.0, Vec3::Y)
     }
 
     fn material(reflectance: ColorInput) -> Material {

@@ -16,7 +16,7 @@ use mateval_dataset::render_file::RENDER_FILE;
 use mateval_dataset::{DatasetError, Progress, RendererId, Report, SceneId, json};
 use mateval_files::FileError;
 use mateval_files::whole::write_whole;
-use mateval_files::work_folder::remove;
+use mateval_files::work_folder::{make_folder, remove};
 
 use super::start::{SceneMark, is_build, settings_sha256};
 use super::twins;
@@ -27,7 +27,7 @@ use crate::render::run::{RendererKind, can_show_input, show_input};
 /// Pictures that a killed render wrote and that no list names yet.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum CutOffRenders {
-    /// A fault: who finishes a dataset wants it whole.
+    /// A fault: `prep finish` promises a whole dataset.
     Refused,
     /// Listed as they are: the build can be resumed, and then the render.
     Listed,
@@ -84,7 +84,7 @@ fn finish_with(
         dataset.licences.extend(recipe.licence_of(id));
     }
     json::write(&root.join(TARGETS), &targets(root, &dataset)?)?;
-    let known = scene_hashes(root, &mut dataset, &wanted_twins(&recipe), cut_off, progress)?;
+    let known = refresh_scenes(root, &mut dataset, &wanted_twins(&recipe), cut_off, progress)?;
     twins::remove_others(root, &all, &dataset.scenes)?;
     write_whole(&root.join(RECIPE), text.as_bytes())?;
     write(root, dataset, &known)
@@ -106,7 +106,7 @@ pub fn finish_again(root: &Path, progress: Progress<'_>) -> Result<DatasetFile, 
         false => twins.into_values().collect(),
     };
     let all = dataset.scenes.clone();
-    let known = scene_hashes(root, &mut dataset, &wanted, CutOffRenders::Refused, progress)?;
+    let known = refresh_scenes(root, &mut dataset, &wanted, CutOffRenders::Refused, progress)?;
     twins::remove_others(root, &all, &dataset.scenes)?;
     write(root, dataset, &known)
 }
@@ -161,7 +161,7 @@ fn put_in_place(root: &Path, id: &SceneId, is_wanted: bool) -> Result<(), PrepEr
         BuildFolder::of(root).note_change(id)?;
     }
     let parent = to.parent().unwrap_or(root);
-    std::fs::create_dir_all(parent).map_err(FileError::io("make", parent))?;
+    make_folder(parent)?;
     Ok(std::fs::rename(&from, &to).map_err(FileError::io("move", &from))?)
 }
 
@@ -184,7 +184,7 @@ pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepEr
 /// Checks the scenes' files, shows the photo renderer's picture in each, makes the `wanted` twins of those that are
 /// rendered, and returns the hashes of all files. Sets the photo renderer, and lists the twins in the dataset, which has
 /// none before.
-fn scene_hashes(
+fn refresh_scenes(
     root: &Path,
     dataset: &mut DatasetFile,
     wanted: &[Twin],
@@ -194,6 +194,7 @@ fn scene_hashes(
     dataset.photo_renderer = photo_renderer(root, dataset);
     let shown = dataset.photo_renderer.clone().or_else(|| any_renderer(root, &dataset.scenes));
     let changed = BuildFolder::of(root).changed();
+    // Check every file against the scenes' lists. Nothing is written unless all fit.
     let (mut findings, mut lists) = (Vec::new(), Vec::new());
     for (at, id) in dataset.scenes.iter().enumerate() {
         progress(Report::step("hashes", at, dataset.scenes.len()));
@@ -212,6 +213,7 @@ fn scene_hashes(
     if !findings.is_empty() {
         return Err(DatasetError::Invalid { path: root.to_owned(), findings }.into());
     }
+    // Show the renderer's picture in each scene, and make its twins of that scene's files.
     let mut twins = Vec::new();
     for (id, shown, list) in &mut lists {
         let of_scene: Vec<Twin> = wanted.iter().filter(|twin| twin.of == **id).cloned().collect();
@@ -226,6 +228,7 @@ fn scene_hashes(
         }
         list.update()?;
     }
+    // List the twins, and gather the hashes of all files.
     let mut lists: Vec<SceneHashes> = lists.into_iter().map(|(_, _, list)| list).collect();
     for twin in twins {
         let list = twins::list(root, dataset, twin)?;
@@ -245,7 +248,7 @@ fn photo_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
 
 /// Whether the scene's input picture is a photo from elsewhere.
 fn is_photographed(root: &Path, id: &SceneId) -> bool {
-    json::read::<SceneFile>(&SceneFolder::of(root, id).scene_file()).is_ok_and(|scene| scene.photo.is_some())
+    SceneFile::read(&SceneFolder::of(root, id)).is_ok_and(|scene| scene.photo.is_some())
 }
 
 /// The first renderer that has rendered every view of some scene.
@@ -256,7 +259,7 @@ fn any_renderer(root: &Path, scenes: &[SceneId]) -> Option<RendererId> {
 
 fn is_complete(root: &Path, id: &SceneId, renderer: &RendererId) -> bool {
     let folder = SceneFolder::of(root, id);
-    json::read::<SceneFile>(&folder.scene_file())
+    SceneFile::read(&folder)
         .is_ok_and(|scene| scene.views.iter().all(|view| folder.render(renderer, &view.id).join(RENDER_FILE).is_file()))
 }
 
@@ -264,7 +267,7 @@ fn is_complete(root: &Path, id: &SceneId, renderer: &RendererId) -> bool {
 fn targets(root: &Path, dataset: &DatasetFile) -> Result<TargetsFile, PrepError> {
     let mut targets = Vec::new();
     for id in &dataset.scenes {
-        let scene: SceneFile = json::read(&SceneFolder::of(root, id).scene_file())?;
+        let scene = SceneFile::read(&SceneFolder::of(root, id))?;
         targets.extend(scene.views.into_iter().map(|view| Target { scene: id.clone(), view: view.id }));
     }
     Ok(TargetsFile { format: FORMAT.to_owned(), targets })

@@ -5,17 +5,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::submission::Map;
-use mateval_dataset::{Finding, Progress, Report, Severity};
-use mateval_files::FileError;
+use mateval_dataset::{Finding, Progress, Report, Severity, TriangleMesh};
 use mateval_files::cache::Key;
+use mateval_files::work_folder::make_folder;
 use mateval_image::{Picture, Texture, png_io};
 use rayon::prelude::*;
 
 use super::baking::{Baked, BakedMaterial, bake};
 use super::parts::InstanceEntry;
 use super::plan::Plan;
-use crate::atlas::cache::{AtlasCache, shape_key};
-use crate::atlas::{AtlasError, SizeWish, Unwrapped, Wanted, unwrap_copies};
+use crate::atlas::{AtlasCache, AtlasError, SizeWish, Unwrapped, Wanted, shape_key, unwrap_copies};
 use crate::error::PrepError;
 
 /// An instance's atlas, if it has one.
@@ -34,7 +33,7 @@ pub(super) struct AtlasSizes<'a> {
 }
 
 /// Unwraps every instance and bakes its material, in parallel.
-pub(super) fn write_materials(
+pub(super) fn unwrap_and_bake(
     plan: &mut Plan,
     folder: &SceneFolder,
     sizes: &AtlasSizes<'_>,
@@ -75,7 +74,7 @@ fn unwrap_all(
     let unwrap = |copies: &Vec<usize>| {
         let wanted: Vec<Wanted<'_>> =
             copies.iter().map(|at| Wanted { mesh: &plan.scene.surfaces[*at].mesh, size: wishes[*at].0 }).collect();
-        let unwrapped = unwrap_copies(plan.shape(copies[0]), &wanted, cache);
+        let unwrapped = unwrap_copies(shape(plan, copies[0]), &wanted, cache);
         progress(Report::step("atlases", done.fetch_add(copies.len(), Ordering::Relaxed) + copies.len(), all));
         copies.iter().copied().zip(unwrapped).collect::<Vec<_>>()
     };
@@ -95,14 +94,22 @@ fn unwrap_all(
 fn copies_of_shapes(plan: &Plan) -> Vec<Vec<usize>> {
     let has_appearance = |at: &usize| plan.scene.materials[plan.scene.surfaces[*at].material.0].has_appearance();
     let seen: Vec<usize> = (0..plan.instances.len()).filter(has_appearance).collect();
-    let keys: Vec<Key> = seen.par_iter().map(|at| shape_key(plan.shape(*at))).collect();
+    let keys: Vec<Key> = seen.par_iter().map(|at| shape_key(shape(plan, *at))).collect();
     let mut shapes: BTreeMap<Key, Vec<usize>> = BTreeMap::new();
     for (at, key) in seen.into_iter().zip(keys) {
         shapes.entry(key).or_default().push(at);
     }
     let mut shapes: Vec<Vec<usize>> = shapes.into_values().collect();
-    shapes.sort_by_key(|copies| std::cmp::Reverse(plan.shape(copies[0]).triangles.len()));
+    shapes.sort_by_key(|copies| std::cmp::Reverse(shape(plan, copies[0]).triangles.len()));
     shapes
+}
+
+/// The mesh before it was moved to its place, if it is known and still the same one; otherwise the mesh itself.
+fn shape(plan: &Plan, instance: usize) -> &TriangleMesh {
+    let mesh = &plan.scene.surfaces[instance].mesh;
+    let is_same =
+        |shape: &&TriangleMesh| shape.triangles == mesh.triangles && shape.positions.len() == mesh.positions.len();
+    plan.origins[instance].shape.as_deref().filter(is_same).unwrap_or(mesh)
 }
 
 /// The wanted size of an instance's atlas, and half a pixel of the input view at its depth in metres. An instance that
@@ -211,7 +218,7 @@ fn clipped_finding(plan: &Plan, instance: &InstanceEntry, baked: &Baked) -> Opti
 
 fn write_material(folder: &SceneFolder, instance: &InstanceEntry, size: u32, baked: &Baked) -> Result<(), PrepError> {
     let path = folder.truth_material(&instance.id);
-    std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
+    make_folder(&path)?;
     let [base, rough, metal] = Map::ALL.map(|map| path.join(map.stem()).with_extension("png"));
     match &baked.material {
         BakedMaterial::Constant { base_color, roughness, metallic } => {

@@ -2,13 +2,13 @@
 //!
 //! In the order of a build: `start` checks the sources and begins the folder, or resumes it. For each scene, `source`
 //! reads the source and chooses the input camera, and `redress` gives it other materials if the recipe says so; `plan`
-//! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one and the colours that were
-//! `measured` in it, checks the input camera against the photo (`poses`), converts the materials and places the views
-//! (`wide_views`); `pictures` writes what each view shows, and `refusals` refuses scenes that would
-//! become a wrong truth; [`materials`] unwraps every instance and bakes its material ([`baking`]); meshes and
-//! `scene.json` are written here. [`finish`] makes the `twins` of rendered scenes
-//! and writes the files of the whole dataset, [`upgrade`] those of one of the previous format. [`fault`] lists why a
-//! scene is refused.
+//! numbers instances and parts ([`parts`], [`labels`]), reads the `photo` if the scene has one and the colours that
+//! were `measured` in it, checks the input camera against the photo (`poses`), converts the materials and places the
+//! views (`wide_views`), and leaves every mesh as it is; `pictures` writes what each view shows, and `refusals` refuses
+//! scenes that would become a wrong truth; [`materials`] unwraps every instance, which splits vertices at the borders
+//! of charts and moves none, and bakes its material ([`baking`]); meshes and `scene.json` are written here. [`finish`]
+//! makes the `twins` of rendered scenes and writes the files of the whole dataset, [`upgrade`] those of one of the
+//! previous format. [`fault`] lists why a scene is refused.
 
 pub mod baking;
 pub mod fault;
@@ -28,39 +28,35 @@ pub(crate) mod twins;
 pub mod upgrade;
 mod wide_views;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mateval_dataset::changes::SceneHashes;
 use mateval_dataset::dataset::{Atlas, FORMAT, Instance, Licence, PartSet, SceneFile, SourceFile};
 use mateval_dataset::glb::{self, GlbNode};
-use mateval_dataset::layout::BuildFolder;
-use mateval_dataset::layout::SceneFolder;
+use mateval_dataset::layout::{BuildFolder, SceneFolder};
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::reference::Surface;
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
 use mateval_dataset::{DatasetError, Finding, InstanceId, Progress, Report, SceneId, TriangleMesh, json, reference};
-use mateval_files::FileError;
-use mateval_files::work_folder::{WorkFolder, remove, remove_beside};
+use mateval_files::source_folder::relative_below;
+use mateval_files::work_folder::{WorkFolder, make_folder, remove, remove_beside};
 use mateval_sources::source_scene::LicenceText;
 
-use crate::atlas::cache::AtlasCache;
+use crate::atlas::AtlasCache;
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{self, Recipe, RecipeScene};
-use crate::redress::{Secret, redress};
+use crate::redress::{RedressKey, redress};
 use crate::render::BlenderOptions;
-use fault::{BuildFault, PinFault, above_notes};
+use fault::{BuildFault, PinFault};
 use finish::finish_build;
-use materials::{AtlasSizes, InstanceAtlas, write_materials};
+use materials::{AtlasSizes, InstanceAtlas, unwrap_and_bake};
 use pictures::write_pictures;
 use plan::{Plan, make_plan};
-use refusals::{check_missing, check_unstated, is_lit};
+use refusals::{check_light, check_missing, check_unstated};
 use source::{Baking, read_source};
 pub use start::BuildOptions;
-use start::{
-    SceneMark, begin, check_sources, finished_scene, label_files, make_relative, secret_of, settings_sha256,
-    source_folder,
-};
+use start::{SceneMark, begin, check_sources, finished_scene, label_files, refuse_if_any, secret_of, settings_sha256};
 
 #[derive(Clone, Debug, Default)]
 pub struct BuildReport {
@@ -96,13 +92,35 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
                 })?;
             }
         }
-        let file: SceneFile = json::read(&SceneFolder::of(&options.out, &entry.id).scene_file())?;
+        let file = SceneFile::read(&SceneFolder::of(&options.out, &entry.id))?;
         report.findings.push((entry.id.clone(), file.findings));
     }
     if options.scenes.is_empty() {
         finish_build(&options.out, tool, progress)?;
     }
     Ok(report)
+}
+
+/// The folder that the recipe's paths are relative to.
+fn source_folder(options: &BuildOptions) -> PathBuf {
+    // The parent of a file name alone is the empty path, which names no folder.
+    let parent = options.recipe.parent().filter(|folder| !folder.as_os_str().is_empty());
+    options.source.clone().unwrap_or_else(|| parent.unwrap_or(Path::new(".")).to_owned())
+}
+
+/// Makes the paths that the dataset records relative to `source`.
+fn make_relative(options: &BuildOptions, recipe: &mut Recipe, source: &Path) -> Result<(), PrepError> {
+    let mut faults = Vec::new();
+    for scene in &mut recipe.scenes {
+        let id = scene.id.clone();
+        for (key, path) in scene.recorded_paths() {
+            match relative_below(path, source) {
+                Ok(relative) => *path = relative,
+                Err(source) => faults.push((id.clone(), RecipeSceneFault::OutsideSource { key, source })),
+            }
+        }
+    }
+    refuse_if_any(options, faults)
 }
 
 /// The recipe's scenes that are to be made.
@@ -142,7 +160,7 @@ fn make_scene(
     let making = Making { recipe, entry, source, blender: options.blender.as_ref(), secret: secret.as_ref() };
     let (licence, absent) = build_scene(&making, &at, cache.as_ref(), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
-    let secret = secret.as_ref().map(Secret::fingerprint);
+    let secret = secret.as_ref().map(RedressKey::fingerprint);
     let made = SceneMark { settings_sha256, licence, secret, absent, labels };
     // Its twins show what it was.
     twins::remove_others(&options.out, std::slice::from_ref(&entry.id), &[])?;
@@ -151,7 +169,7 @@ fn make_scene(
     SceneHashes::empty(&options.out, &entry.id).update()?;
     // The mark is written last, since a scene without its mark is made again.
     let marks = mark.parent().unwrap_or(&mark);
-    std::fs::create_dir_all(marks).map_err(FileError::io("make", marks))?;
+    make_folder(marks)?;
     Ok(json::write(&mark, &made)?)
 }
 
@@ -164,7 +182,7 @@ struct Making<'a> {
     /// Reads the source if it is a Blender file.
     blender: Option<&'a BlenderOptions>,
     /// Redresses the scene.
-    secret: Option<&'a Secret>,
+    secret: Option<&'a RedressKey>,
 }
 
 /// Makes the scene in `folder`. Atlases are taken from the cache where it holds them. Returns what the folder does not
@@ -201,12 +219,9 @@ fn build_scene(
     let mut seen = write_pictures(&plan, folder, &expected, progress)?.or_refuse(&entry.id, &plan)?;
     let unstated = check_unstated(entry, &plan, &seen).map_err(PrepError::scene(&entry.id))?;
     plan.findings.extend(unstated);
-    if !is_lit(&plan, entry.exposure)? {
-        let findings = above_notes(&[plan.findings.as_slice(), &seen.findings].concat());
-        return Err(PrepError::scene(&entry.id)(BuildFault::NoLight { lights: plan.scene.lights.len(), findings }));
-    }
+    check_light(entry, &plan, &seen)?;
     let sizes = AtlasSizes { fixed: entry.atlas_size.or(recipe.atlas_size), nearest: &seen.nearest };
-    let atlases = write_materials(&mut plan, folder, &sizes, cache, progress)?;
+    let atlases = unwrap_and_bake(&mut plan, folder, &sizes, cache, progress)?;
     let scored: Vec<bool> = atlases.iter().map(|atlas| atlas.unwrapped.is_some()).collect();
     if scored != expected {
         // An instance without an atlas cannot be scored, so its pixels must not be valid.
@@ -261,7 +276,7 @@ fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
     let views = plan.views.iter().flat_map(|view| [folder.view(&view.id), folder.truth_view(&view.id)]);
     let geometry = folder.path().join("geometry");
     for path in views.chain([geometry]) {
-        std::fs::create_dir_all(&path).map_err(FileError::io("make", path))?;
+        make_folder(&path)?;
     }
     Ok(())
 }
@@ -345,4 +360,28 @@ fn write_scene_file(
         findings,
     };
     Ok(json::write(&folder.scene_file(), &file)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipe_without_a_folder_lies_in_the_current_one() {
+        let source = |recipe: &str| {
+            source_folder(&BuildOptions {
+                recipe: recipe.into(),
+                source: None,
+                out: "out".into(),
+                scenes: Vec::new(),
+                force: false,
+                blender: None,
+                atlas_cache: None,
+            })
+        };
+        for (recipe, folder) in [("mini.toml", "."), ("recipes/mini.toml", "recipes"), ("/mini.toml", "/")] {
+            assert_eq!(source(recipe), Path::new(folder));
+            assert!(std::path::absolute(source(recipe)).is_ok());
+        }
+    }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU16;
 
 use mateval_dataset::dataset::Part;
-use mateval_dataset::ids::{PartIndex, id_text_from};
+use mateval_dataset::ids::{PartIndex, id_text_from, unused_name};
 use mateval_dataset::reference::{ReferenceScene, Surface};
 use mateval_dataset::{InstanceId, InstanceIndex, PartId, PartSetId, Role, TriangleMesh};
 use mateval_sources::source_scene::InstanceOrigin;
@@ -45,9 +45,9 @@ pub fn list_instances(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Res
         .zip(origins)
         .enumerate()
         .map(|(at, (surface, origin))| {
-            let id = unique_id(surface, &mut taken);
+            let id = unused_name(&id_text_from(&surface.name, "object"), '-', &mut taken);
             Ok(InstanceEntry {
-                id,
+                id: InstanceId::new(id).expect("a stem of 48 characters at most and a number is an id"),
                 index: InstanceIndex(number(at + 1)?),
                 role: origin.role.clone(),
                 category: origin.category.clone(),
@@ -55,18 +55,6 @@ pub fn list_instances(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Res
             })
         })
         .collect()
-}
-
-/// The surface's name as an id. If the id is taken, a number is appended.
-fn unique_id(surface: &Surface, taken: &mut BTreeSet<String>) -> InstanceId {
-    let stem = id_text_from(&surface.name, "object");
-    let mut text = stem.clone();
-    let mut copy = 2;
-    while !taken.insert(text.clone()) {
-        text = format!("{stem}-{copy}");
-        copy += 1;
-    }
-    InstanceId::new(text).expect("a stem of 48 characters at most and a number is an id")
 }
 
 /// A split of all instances into parts.

@@ -8,7 +8,7 @@ use mateval_dataset::dataset::{Redressed, SceneSource, SourceFile, TrueMaterials
 use mateval_dataset::material::{ClassifiedPart, MaterialClass};
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::reference::SourceMaterials;
-use mateval_dataset::{Camera, Finding, SceneLights, TriangleMesh, ViewId};
+use mateval_dataset::{Camera, Finding, SceneLights, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::SourceFolder;
 use mateval_sources::source_scene::{FileScene, InstanceOrigin, SourceScene};
@@ -22,7 +22,7 @@ use super::photo::{ScenePhoto, read_novel_photos, read_photo};
 use super::poses::other_convention;
 use super::source::{placed_view, views_of};
 use super::wide_views::wide_views;
-use crate::conversion::convert;
+use crate::conversion::convert_materials;
 use crate::error::PrepError;
 use crate::recipe::{Availability, Recipe, RecipeScene};
 
@@ -53,16 +53,6 @@ pub(super) struct Plan {
     pub(super) findings: Vec<Finding>,
     /// The file that findings refer to by default.
     pub(super) file: String,
-}
-
-impl Plan {
-    /// The mesh before it was moved to its place, if it is known and still the same one; otherwise the mesh itself.
-    pub(super) fn shape(&self, instance: usize) -> &TriangleMesh {
-        let mesh = &self.scene.surfaces[instance].mesh;
-        let is_same =
-            |shape: &&TriangleMesh| shape.triangles == mesh.triangles && shape.positions.len() == mesh.positions.len();
-        self.origins[instance].shape.as_deref().filter(is_same).unwrap_or(mesh)
-    }
 }
 
 /// Numbers the instances and parts of a scene that was read, and places its cameras. Returns also the files that were
@@ -101,7 +91,7 @@ pub(super) fn make_plan(
     let (scene, source_materials) = match recipe.materials {
         TrueMaterials::Source => (read.scene, None),
         TrueMaterials::Converted => {
-            let converted = convert(read.scene, &file)?;
+            let converted = convert_materials(read.scene, &file)?;
             findings.extend(converted.findings);
             (converted.scene, converted.source)
         }

@@ -188,10 +188,11 @@ pub(super) fn check_unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> R
     )))
 }
 
-/// Whether enough light reaches the input view for a picture that is not black. A photo from elsewhere has its own light.
-pub(super) fn is_lit(plan: &Plan, exposure: f64) -> Result<bool, PrepError> {
+/// Fails where too little light reaches the input view, whose picture would be black. A photo from elsewhere has its
+/// own light.
+pub(super) fn check_light(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<(), PrepError> {
     if plan.photo.is_some() {
-        return Ok(true);
+        return Ok(());
     }
     let world = World::new(Arc::clone(&plan.scene))?;
     let camera = coarse(&plan.views[0].camera);
@@ -201,12 +202,13 @@ pub(super) fn is_lit(plan: &Plan, exposure: f64) -> Result<bool, PrepError> {
         let sums = render.views[0].by_seed.iter().map(LightBasis::sum);
         if sums
             .flat_map(|sum| sum.pixels().to_vec())
-            .any(|pixel| pixel.0.iter().any(|value| exposure * f64::from(*value) >= LEAST_LIGHT))
+            .any(|pixel| pixel.0.iter().any(|value| entry.exposure * f64::from(*value) >= LEAST_LIGHT))
         {
-            return Ok(true);
+            return Ok(());
         }
     }
-    Ok(false)
+    let findings = above_notes(&[plan.findings.as_slice(), &seen.findings].concat());
+    Err(PrepError::scene(&entry.id)(BuildFault::NoLight { lights: plan.scene.lights.len(), findings }))
 }
 
 /// The camera with a small picture.

@@ -278,7 +278,8 @@ fn front3d_scene(
         let (wanted, known) = (format!("room '{}'", room.room), quoted(&rooms));
         return Err(PrepError::scene(&entry.id)(BuildFault::NotInHouse { wanted, known }));
     };
-    // The camera sampler and the choice of surfaces that the views see share one world.
+    // The camera sampler and the choice of surfaces that the views see share one world. The choice keeps or leaves out
+    // whole surfaces.
     let world = World::new(house.scene.clone())?;
     let camera = room_camera(recipe, entry, &house, &world, number).map_err(PrepError::scene(&entry.id))?;
     let views: Vec<Camera> = views_of(recipe, camera).iter().map(|view| view.camera).collect();

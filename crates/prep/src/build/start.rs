@@ -10,17 +10,15 @@ use mateval_dataset::dataset::{Licence, SceneFile, SourceFile};
 use mateval_dataset::layout::{BUILD, BuildFolder};
 use mateval_dataset::layout::{DATASET, SceneFolder};
 use mateval_dataset::{SceneId, json};
-use mateval_files::FileError;
-use mateval_files::source_folder::relative_below;
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
-use mateval_files::work_folder::{check_holds_none, put_aside, remove, remove_abandoned};
+use mateval_files::work_folder::{check_holds_none, make_folder, put_aside, remove, remove_abandoned};
 use serde::{Deserialize, Serialize};
 
 use super::labels::file_names;
 use crate::error::PrepError;
 use crate::recipe::fault::{RecipeFault, RecipeSceneFault};
 use crate::recipe::{Recipe, RecipeScene, Redress, SourcePath};
-use crate::redress::Secret;
+use crate::redress::RedressKey;
 use crate::redress::secret::SecretFault;
 use crate::render::BlenderOptions;
 
@@ -41,30 +39,8 @@ pub struct BuildOptions {
     pub atlas_cache: Option<PathBuf>,
 }
 
-/// The folder that the recipe's paths are relative to.
-pub(super) fn source_folder(options: &BuildOptions) -> PathBuf {
-    // The parent of a file name alone is the empty path, which names no folder.
-    let parent = options.recipe.parent().filter(|folder| !folder.as_os_str().is_empty());
-    options.source.clone().unwrap_or_else(|| parent.unwrap_or(Path::new(".")).to_owned())
-}
-
-/// Makes the paths that the dataset records relative to `source`.
-pub(super) fn make_relative(options: &BuildOptions, recipe: &mut Recipe, source: &Path) -> Result<(), PrepError> {
-    let mut faults = Vec::new();
-    for scene in &mut recipe.scenes {
-        let id = scene.id.clone();
-        for (key, path) in scene.recorded_paths() {
-            match relative_below(path, source) {
-                Ok(relative) => *path = relative,
-                Err(source) => faults.push((id.clone(), RecipeSceneFault::OutsideSource { key, source })),
-            }
-        }
-    }
-    refuse_if_any(options, faults)
-}
-
 /// Fails where a scene of the recipe has a fault.
-fn refuse_if_any(options: &BuildOptions, faults: Vec<(SceneId, RecipeSceneFault)>) -> Result<(), PrepError> {
+pub(super) fn refuse_if_any(options: &BuildOptions, faults: Vec<(SceneId, RecipeSceneFault)>) -> Result<(), PrepError> {
     if faults.is_empty() {
         return Ok(());
     }
@@ -82,10 +58,10 @@ pub(super) fn check_sources(options: &BuildOptions, scenes: &[&RecipeScene], sou
 
 /// The key and the materials that a scene is redressed with, if it is. Fails where they could be published with the
 /// dataset `out` or with what lies below `source`.
-pub(super) fn secret_of(entry: &RecipeScene, source: &Path, out: &Path) -> Result<Option<Secret>, SecretFault> {
+pub(super) fn secret_of(entry: &RecipeScene, source: &Path, out: &Path) -> Result<Option<RedressKey>, SecretFault> {
     let Some(Redress { key, materials }) = &entry.redress else { return Ok(None) };
     let materials = materials.as_ref().map(|folder| source.join(folder));
-    Secret::open(&source.join(key), materials.as_deref(), &[source, out]).map(Some)
+    RedressKey::open(&source.join(key), materials.as_deref(), &[source, out]).map(Some)
 }
 
 /// The faults that `check` finds in the scenes.
@@ -188,7 +164,7 @@ pub(super) fn begin(
     // Before the lease, which is a file in the folder.
     check_place(options, Place::of(out))?;
     let build = BuildFolder::of(out);
-    std::fs::create_dir_all(build.path()).map_err(FileError::io("make", build.path()))?;
+    make_folder(build.path())?;
     let _lease = build.lease_of_start()?;
     let place = Place::of(out);
     check_place(options, place)?;
@@ -200,7 +176,7 @@ pub(super) fn begin(
         check_holds_none(out, &[&options.recipe, source])?;
         let _whole = build.lease_of_whole(&[])?;
         let old = put_aside(out)?;
-        std::fs::create_dir_all(build.path()).map_err(FileError::io("make", build.path()))?;
+        make_folder(build.path())?;
         old.as_deref().map_or(Ok(()), remove)?;
     }
     remove_abandoned(out)?;
@@ -285,9 +261,9 @@ pub(crate) struct SceneMark {
 /// The mark of a scene that an earlier run made from the same files: none has changed, and none has been added since.
 pub(super) fn finished_scene(root: &Path, entry: &RecipeScene, source: &Path) -> Option<SceneMark> {
     let mark: SceneMark = json::read(&BuildFolder::of(root).mark(&entry.id)).ok()?;
-    let scene: SceneFile = json::read(&SceneFolder::of(root, &entry.id).scene_file()).ok()?;
+    let scene = SceneFile::read(&SceneFolder::of(root, &entry.id)).ok()?;
     let secret = secret_of(entry, source, root).ok()?;
-    if mark.secret != secret.as_ref().map(Secret::fingerprint) {
+    if mark.secret != secret.as_ref().map(RedressKey::fingerprint) {
         return None;
     }
     let root = entry.root(source);
@@ -331,28 +307,4 @@ pub(crate) fn settings_sha256(recipe: &Recipe, id: &SceneId, tool: &str) -> Stri
         "{tool}\n{resolution:?}\n{views:?}\n{wide:?}\n{atlas_size:?}\n{materials:?}\n{camera_rules}\n{entry:?}"
     );
     sha256_of_bytes(settings.as_bytes())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_recipe_without_a_folder_lies_in_the_current_one() {
-        let source = |recipe: &str| {
-            source_folder(&BuildOptions {
-                recipe: recipe.into(),
-                source: None,
-                out: "out".into(),
-                scenes: Vec::new(),
-                force: false,
-                blender: None,
-                atlas_cache: None,
-            })
-        };
-        for (recipe, folder) in [("mini.toml", "."), ("recipes/mini.toml", "recipes"), ("/mini.toml", "/")] {
-            assert_eq!(source(recipe), Path::new(folder));
-            assert!(std::path::absolute(source(recipe)).is_ok());
-        }
-    }
 }

@@ -15,7 +15,7 @@ use mateval_dataset::reference::LightsFile;
 use mateval_dataset::{DatasetError, Progress, RendererId, Report, SceneId, ViewId, json};
 use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_file;
-use mateval_files::work_folder::{WorkFolder, remove};
+use mateval_files::work_folder::{WorkFolder, make_folder, remove};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
 
@@ -80,7 +80,7 @@ fn make_one(
     let at = SceneFolder::at(work.path().to_owned());
     // What is its own.
     let input = at.view(&scene.views[0].id);
-    std::fs::create_dir_all(&input).map_err(FileError::io("make", &input))?;
+    make_folder(&input)?;
     exr_io::write_linear(&input.join("rgb.exr"), photo, Precision::Float)?;
     write_preview(&input, photo, scene.exposure)?;
     json::write(&at.scene_file(), &SceneFile { id: id.clone(), ..scene.clone() })?;
@@ -107,7 +107,7 @@ fn make_one(
     for (file, _) in shared {
         let (from, to) = (root.join(&prefix).join(file), work.path().join(file));
         let parent = to.parent().unwrap_or(work.path());
-        std::fs::create_dir_all(parent).map_err(FileError::io("make", parent))?;
+        make_folder(parent)?;
         // Some file systems have no hard links.
         if std::fs::hard_link(&from, &to).is_err() {
             std::fs::copy(&from, &to).map_err(FileError::io("copy", &from))?;
@@ -134,7 +134,7 @@ pub(crate) fn photo(
     renderer: &RendererId,
     lighting: LightingName,
 ) -> Result<Option<Picture<LinearRgb>>, PrepError> {
-    let id = ViewId::new(INPUT).expect("'input' is a valid id");
+    let id = ViewId::input();
     let view = scene.view(INPUT).ok_or_else(|| PrepError::unusable(folder.scene_file(), "has no input view"))?;
     let lights: LightsFile = json::read_format(&folder.lights(), FORMAT)?;
     let rendered = folder.render(renderer, &id);

@@ -5,7 +5,7 @@
 //! of those that do, the one is taken whose picture shows most that the input view did not.
 
 use glam::{DVec2, DVec3};
-use mateval_dataset::camera::{Camera, Intrinsics};
+use mateval_dataset::camera::Camera;
 use mateval_dataset::dataset::{View, WideView};
 use mateval_dataset::{Finding, Severity, ViewId};
 use mateval_sources::front3d::camera_rules::SamplerRules;
@@ -187,7 +187,7 @@ impl<'a> Judge<'a> {
     }
 
     fn shown(&self, camera: &Camera) -> Shown {
-        let small = Camera { intrinsics: scaled_down(&camera.intrinsics), ..*camera };
+        let small = scaled_down(camera);
         let (width, height) = (small.intrinsics.width as usize, small.intrinsics.height as usize);
         let share = 1.0 / (width * height) as f64;
         let mut shown = Shown::default();
@@ -202,16 +202,8 @@ impl<'a> Judge<'a> {
 }
 
 /// The same field of view in few pixels.
-fn scaled_down(whole: &Intrinsics) -> Intrinsics {
-    let scale = f64::from(JUDGED_COLUMNS) / f64::from(whole.width);
-    let height = (f64::from(whole.height) * scale).round().max(1.0) as u32;
-    let down = f64::from(height) / f64::from(whole.height);
-    Intrinsics {
-        width: JUDGED_COLUMNS,
-        height,
-        fx: whole.fx * scale,
-        fy: whole.fy * down,
-        cx: whole.cx * scale,
-        cy: whole.cy * down,
-    }
+fn scaled_down(whole: &Camera) -> Camera {
+    let scale = f64::from(JUDGED_COLUMNS) / f64::from(whole.intrinsics.width);
+    let height = (f64::from(whole.intrinsics.height) * scale).round().max(1.0) as u32;
+    whole.resized(JUDGED_COLUMNS, height)
 }

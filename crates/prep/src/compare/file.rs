@@ -9,13 +9,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The value of `format` in this version of the file.
-pub const COMPARE_FORMAT: &str = "mateval-compare/3";
+pub const COMPARE_FORMAT: &str = "mateval-compare/4";
 
 /// `compare.json`, and what `mateval prep compare --format json` prints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompareFile {
-    /// Always `mateval-compare/3`.
+    /// Always `mateval-compare/4`.
     pub format: String,
     /// The program that compared and its version, as in `mateval 0.1.0`.
     pub tool: String,
@@ -49,25 +49,8 @@ pub struct SceneComparison {
     pub passes: Vec<u32>,
     /// Seeds of the halves of the first pass, 16 hexadecimal digits each.
     pub seeds: [String; 2],
-    /// How far the converted materials, which the pictures show, are from the source's own; null where they were not
-    /// converted, or where no view was compared. It is information and no check.
-    pub source_materials: Option<SourceComparison>,
     /// The views, in the scene's order.
     pub views: Vec<ViewComparison>,
-}
-
-/// The built-in tracer's pictures of converted materials, compared with its pictures of the source's own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SourceComparison {
-    /// The view, the first that was compared.
-    pub view: ViewId,
-    /// PSNR of the source's picture over valid pixels, times `exposure`, clipped and sRGB-encoded, in decibels, from
-    /// the product of both halves' errors, in which their noise cancels; null where that is not above 0.
-    pub psnr_db: Option<f64>,
-    /// RGB, first with the converted materials and then with the source's. Both are rendered with the same seeds, so
-    /// that the noise of the difference is at most what the standard errors state.
-    pub light: LightComparison,
 }
 
 /// One view.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::views::base_color_at_centres;
 use mateval_dataset::dataset::View;
 use mateval_dataset::layout::SceneFolder;
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
@@ -12,6 +11,7 @@ use mateval_tracer::World;
 use super::file::{BOUNDS, Check, Quantity, State};
 use super::pictures::TheirView;
 use super::tiles::median;
+use crate::views::base_color_at_centres;
 
 /// The dataset's own pictures of a view.
 pub(super) struct OurGeometry {

@@ -137,7 +137,7 @@ fn compare_tiles(tiles: &[&Tile], off: &[Difference], allowed: Tolerance, scale:
     }
 }
 
-/// Whether a tile may hide a fault: it is not over the bound, and too noisy for the statement that no fault is there.
+/// Whether a tile may hide a fault: it is within the bound, but too noisy to state that it has none.
 fn hides(off: &Difference, allowed: Tolerance, scale: [f64; 3]) -> bool {
     !off.is_over(allowed, scale) && off.is_open(allowed, scale)
 }

@@ -6,8 +6,7 @@
 //! Between: `pictures` reads Blender's pictures and renders ours; `geometry` compares pictures without light, and
 //! `light` compares pictures of light tile by tile, with the statistics of `tiles`. A check of light has three outcomes:
 //! a fault, none, or too much noise to say; samples of ours are added while that would decide a check. [`mod@file`] states
-//! which materials may differ and how far. Converted materials are compared with the source's own by the built-in tracer's pictures of
-//! both.
+//! which materials may differ and how far.
 
 pub mod file;
 mod geometry;
@@ -21,8 +20,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::recipe::MOST_SAMPLES;
-use crate::render::RendererKind;
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{BuildFolder, COMPARE, SceneFolder};
 use mateval_dataset::open::{Dataset, check_outside};
@@ -31,13 +28,11 @@ use mateval_dataset::render_file::RENDER_FILE;
 use mateval_dataset::verdict::{CompareCounts, VERDICT_FORMAT, VerdictFile};
 use mateval_dataset::{Progress, Report, SceneId, json, reference};
 use mateval_files::work_folder::{WorkFolder, check_free};
-use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_metrics::Psnr;
 use mateval_tracer::World;
 
 use self::file::{
-    BOUNDS, COMPARE_FORMAT, CompareFile, LightComparison, MaterialKind, SamplesToDecide, SceneComparison,
-    SourceComparison, State, ViewComparison, file_check,
+    BOUNDS, COMPARE_FORMAT, CompareFile, LightComparison, MaterialKind, SamplesToDecide, SceneComparison, State,
+    ViewComparison, file_check,
 };
 use self::geometry::{OurGeometry, TheirGeometry};
 use self::light::ShownKinds;
@@ -45,6 +40,8 @@ use self::page::ViewPreviews;
 use self::pictures::{OurLight, OurRender, TheirView};
 use self::tiles::Halves;
 use crate::error::PrepError;
+use crate::recipe::MOST_SAMPLES;
+use crate::render::RendererKind;
 
 /// Samples per pixel of each half that the built-in tracer renders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -228,21 +225,10 @@ fn compare_scene(
         previews.extend(shown);
     }
     progress(Report::step(&step, scene.views.len(), scene.views.len()));
-    let source_materials = match (pairs.first(), ours.lights.first()) {
-        (Some(pair), Some(light)) => Converted { pair, scene, rgb: &light.rgb }.compare(ours.passes(), progress)?,
-        _ => None,
-    };
     let seeds = pictures::seeds(&scene.id, 0).map(|seed| format!("{seed:016x}"));
     let kinds = kinds.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
-    let found = SceneComparison {
-        scene: scene.id.clone(),
-        kinds,
-        tile_bound,
-        passes: ours.passes().to_vec(),
-        seeds,
-        source_materials,
-        views,
-    };
+    let found =
+        SceneComparison { scene: scene.id.clone(), kinds, tile_bound, passes: ours.passes().to_vec(), seeds, views };
     Ok((found, previews))
 }
 
@@ -397,58 +383,5 @@ impl ViewPair<'_> {
                 None
             }
         }
-    }
-}
-
-/// A view of a scene, rendered with its converted materials.
-struct Converted<'a> {
-    pair: &'a ViewPair<'a>,
-    scene: &'a SceneFile,
-    rgb: &'a Halves,
-}
-
-impl Converted<'_> {
-    /// Renders the view with the source's own materials and compares; absent if the materials were not converted.
-    fn compare(&self, passes: &[u32], progress: Progress<'_>) -> Result<Option<SourceComparison>, PrepError> {
-        let ViewPair { folder, view, world, kinds, tile_bound, reference, .. } = *self.pair;
-        let Some(source) = reference::read_source_materials(folder, reference.materials.len())? else {
-            return Ok(None);
-        };
-        let own = World::sharing(Arc::new(source.in_scene(reference)), world.accel().clone())?;
-        let mut theirs = OurRender::new();
-        for samples in passes {
-            theirs.add(&own, &self.scene.id, &[view], *samples, progress)?;
-        }
-        let samples = SamplesToDecide { ours: theirs.samples(), theirs: theirs.samples() };
-        let Some(theirs) = theirs.lights.first().map(|light| &light.rgb) else { return Ok(None) };
-        let geometry = self.pair.geometry()?;
-        let shown = ShownKinds::new(&geometry.instance, kinds, &geometry.valid);
-        let (light, _) = light::compare("rgb", None, [self.rgb, theirs], samples, &shown, tile_bound);
-        let error = self.error_without_noise(theirs, &geometry.valid).filter(|error| *error > 0.0);
-        let psnr_db = error.and_then(|error| Psnr::from_mse(error).ok()).map(|psnr| psnr.db);
-        Ok(Some(SourceComparison { view: view.id.clone(), psnr_db, light }))
-    }
-
-    /// The mean over valid pixels of the product of the halves' errors, which are independent of each other, as a
-    /// preview shows them; absent if no pixel is valid.
-    fn error_without_noise(&self, theirs: &Halves, valid: &Mask) -> Option<f64> {
-        let errors = [(&self.rgb.a, &theirs.a), (&self.rgb.b, &theirs.b)]
-            .map(|(ours, theirs)| (self.exposed(ours).to_srgb(), self.exposed(theirs).to_srgb()));
-        let (mut sum, mut count) = (0.0, 0_usize);
-        for at in (0..valid.pixels().len()).filter(|at| valid.pixels()[*at]) {
-            for channel in 0..3 {
-                let [a, b] = [&errors[0], &errors[1]].map(|(ours, theirs)| {
-                    f64::from(theirs.pixels()[at].0[channel]) - f64::from(ours.pixels()[at].0[channel])
-                });
-                sum += a * b;
-            }
-            count += 3;
-        }
-        (count > 0).then(|| sum / count as f64)
-    }
-
-    fn exposed(&self, picture: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-        let exposure = self.scene.exposure as f32;
-        picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|value| (value * exposure).clamp(0.0, 1.0))))
     }
 }

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::SceneId;
 use mateval_dataset::dataset::{DatasetVersion, SceneFile};
-use mateval_files::{FileError, untrusted};
+use mateval_files::untrusted;
+use mateval_files::work_folder::make_folder;
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Normal, Picture};
@@ -15,7 +16,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::file::{Check, CompareFile, LightComparison, SceneComparison, SourceComparison, State, ViewComparison};
+use super::file::{Check, CompareFile, LightComparison, SceneComparison, State, ViewComparison};
 use super::geometry::{OurGeometry, TheirGeometry, angle_deg, away_from_edges};
 use super::light::ShownKinds;
 use super::tables::{Counts, counted, verdict};
@@ -94,20 +95,11 @@ pub(super) fn write_scene(
         scene => scene.scene.as_str(), renderer => &file.renderer, kinds, views,
         class => class(Counts::of(scene)), verdict => counted(&checks, &file.renderer),
         tile_bound => 100.0 * scene.tile_bound, samples => scene.samples_each_half(),
-        source => scene.source_materials.as_ref().map(source_sentence),
     };
     let folder = out.join(scene_folder(&scene.scene));
-    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+    make_folder(&folder)?;
     let page = pages::single(SCENE, values, "");
     Ok(mateval_files::whole::write_whole(&folder.join("index.html"), page.as_bytes())?)
-}
-
-/// How far the converted materials of a scene are from the source's own.
-fn source_sentence(source: &SourceComparison) -> String {
-    let psnr = source.psnr_db.map_or_else(|| "no error above the noise".to_owned(), |db| format!("{db:.1} dB"));
-    let mean = source.light.mean.and_then(|mean| mean.difference);
-    let mean = mean.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
-    format!("The source's own materials against the converted ones in {}: {psnr}, mean off {mean}", source.view)
 }
 
 /// Ends of the scale of differences. Of a pixel of light: relative to the picture's mean over valid pixels that decide.
@@ -181,7 +173,7 @@ impl ViewPreviews {
     pub(super) fn new(out: &Path, scene: &SceneFile, found: &ViewComparison, whole: bool) -> Result<Self, PrepError> {
         let out = out.join(scene_folder(&scene.id));
         let place = out.join(found.view.as_str());
-        std::fs::create_dir_all(&place).map_err(FileError::io("make", &place))?;
+        make_folder(&place)?;
         let faults = found.checks.iter().filter(|check| check.state.is_fault());
         let shown_by = |check: &Check| match check.picture.as_str() {
             "silhouette" => "instance".to_owned(),

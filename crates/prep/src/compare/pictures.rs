@@ -3,17 +3,16 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::render::MAX_BOUNCES;
 use mateval_dataset::dataset::View;
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
-use mateval_dataset::{Camera, Progress, Report, SceneId, json};
-use mateval_files::untrusted::sha256_of_bytes;
+use mateval_dataset::{Camera, Progress, Report, SceneId, json, splitmix64};
 use mateval_image::{ImageError, LinearRgb, Picture, exr_io};
 use mateval_tracer::{RenderSettings, ViewLight, World, render_views};
 
 use super::file::{Check, State, file_check};
 use super::tiles::Halves;
 use crate::error::PrepError;
+use crate::render::MAX_BOUNCES;
 
 /// The folder of Blender's pictures of a view.
 #[derive(Clone, Debug)]
@@ -77,8 +76,7 @@ pub(super) struct OurLight {
 pub(super) fn seeds(scene: &SceneId, pass: usize) -> [u64; 2] {
     ["a", "b"].map(|half| {
         let number = if pass == 0 { String::new() } else { format!("/{pass}") };
-        let text = sha256_of_bytes(format!("compare/{scene}/{half}{number}").as_bytes());
-        u64::from_str_radix(&text[..16], 16).expect("a hash is hexadecimal")
+        splitmix64::seed_of(&format!("compare/{scene}/{half}{number}"))
     })
 }
 

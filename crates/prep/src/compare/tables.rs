@@ -16,7 +16,7 @@ const MOST_FAULTS: usize = 40;
 /// The tables, then the checks that do not agree, then the verdict, for a terminal of `columns`; of any width if absent.
 pub fn text(file: &CompareFile, columns: Option<usize>) -> String {
     let tables = match file.scenes.len() {
-        ..=SCENES_IN_FULL => vec![geometry(file), light(file), apart(file), source_materials(file)],
+        ..=SCENES_IN_FULL => vec![geometry(file), light(file), apart(file)],
         _ => vec![scenes(file)],
     };
     let tables = tables.iter().map(|table| table.text(columns)).collect::<Vec<_>>().join("\n");
@@ -238,28 +238,6 @@ fn apart(file: &CompareFile) -> Table {
         words: 3,
         rows,
     }
-}
-
-/// How far the converted materials are from the source's own.
-fn source_materials(file: &CompareFile) -> Table {
-    let mut rows = vec![row(["scene", "view", "PSNR", "mean off", "tiles", "over", "median", "worst"])];
-    for scene in &file.scenes {
-        let Some(source) = &scene.source_materials else { continue };
-        let signed = |off: Option<f64>| off.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
-        let tiles = &source.light.tiles;
-        rows.push(row([
-            scene.scene.as_str(),
-            source.view.as_str(),
-            &source.psnr_db.map_or_else(|| "none".to_owned(), |db| format!("{db:.1} dB")),
-            &signed(source.light.mean.and_then(|mean| mean.difference)),
-            &tiles.count.to_string(),
-            &tiles.over.to_string(),
-            &percent(tiles.median),
-            &signed(tiles.worst.and_then(|worst| worst.off.difference)),
-        ]));
-    }
-    let title = "The source's own materials against the converted ones, both by the built-in tracer; no check";
-    Table { title: title.to_owned(), words: 2, rows }
 }
 
 fn percent(share: Option<f64>) -> String {

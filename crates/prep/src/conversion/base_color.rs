@@ -230,7 +230,7 @@ impl<'a> DerivedTextures<'a> {
             return *known;
         }
         let Some(source) = self.source.get(texture.0).filter(|_| channel < 3) else { return TextureIndex(usize::MAX) };
-        let values = texel_values(&source.texture).map(|texel| change(texel[channel]));
+        let values = source.texture.linear_texels().map(|texel| change(texel[channel]));
         let texels = match source.texture.texels() {
             Texels::Srgb16(_) | Texels::Linear(_) | Texels::Grey(_) => Texels::Grey(values.collect()),
             Texels::Srgb8(_) | Texels::Linear8(_) | Texels::Grey8(_) => {
@@ -263,7 +263,7 @@ impl<'a> DerivedTextures<'a> {
     fn mean(&self, texture: TextureIndex) -> Option<[f32; 3]> {
         let texture = &self.source.get(texture.0)?.texture;
         let mut sum = [0.0_f64; 3];
-        for texel in texel_values(texture) {
+        for texel in texture.linear_texels() {
             sum.iter_mut().zip(texel).for_each(|(sum, value)| *sum += f64::from(value.clamp(0.0, 1.0)));
         }
         let count = (texture.width() * texture.height()) as f64;
@@ -284,15 +284,9 @@ fn with_texels(source: &SourceTexture, texels: Texels) -> SourceTexture {
     SourceTexture { name: source.name.clone(), sha256: source.sha256.clone(), texture }
 }
 
-/// The linear values of all texels, row by row.
-fn texel_values(texture: &Texture) -> impl Iterator<Item = [f32; 3]> {
-    let (width, height) = (texture.width(), texture.height());
-    (0..height).flat_map(move |y| (0..width).map(move |x| texture.texel(x, y)))
-}
-
 /// The texels of a base colour, stored as finely as the source's.
 fn color_texels(texture: &Texture, rule: &BaseColorRule) -> Texels {
-    let values = texel_values(texture);
+    let values = texture.linear_texels();
     let encoded = |rgb: [f32; 3]| rule.apply(rgb).map(srgb_from_linear);
     match texture.texels() {
         Texels::Srgb8(_) | Texels::Linear8(_) | Texels::Grey8(_) => {

@@ -33,7 +33,7 @@ pub struct Conversion {
 }
 
 /// Converts the materials of `scene`. Findings name `file`. Fails where a parameter of a material is out of range.
-pub fn convert(scene: ReferenceScene, file: &str) -> Result<Conversion, TracerError> {
+pub fn convert_materials(scene: ReferenceScene, file: &str) -> Result<Conversion, TracerError> {
     if scene.materials.iter().all(is_scored_model) {
         return Ok(Conversion { scene, source: None, findings: Vec::new() });
     }
@@ -277,7 +277,7 @@ mod tests {
     }
 
     fn converted(model: MaterialModel) -> MaterialModel {
-        convert(scene(vec![material(model)], Vec::new()), "scene.xml").unwrap().scene.materials[0].model
+        convert_materials(scene(vec![material(model)], Vec::new()), "scene.xml").unwrap().scene.materials[0].model
     }
 
     /// The largest difference between the shares of uniform light that two models reflect.
@@ -480,7 +480,8 @@ mod tests {
             lights,
             ..scene(vec![wood.clone(), brushed.clone(), glass.clone(), wood.clone()], textures)
         };
-        let Conversion { scene: found, source: kept, findings } = convert(source.clone(), "scene.xml").unwrap();
+        let Conversion { scene: found, source: kept, findings } =
+            convert_materials(source.clone(), "scene.xml").unwrap();
 
         assert!(found.materials.iter().all(is_scored_model));
         assert_eq!((found.surfaces, found.materials.len()), (surfaces, 4));
@@ -543,13 +544,13 @@ mod tests {
     #[test]
     fn colours_beyond_one_are_clipped_and_reported() {
         let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([2.0, 0.5, 0.5]), alpha: None };
-        let found = convert(scene(vec![material(model)], Vec::new()), "scene.xml").unwrap();
+        let found = convert_materials(scene(vec![material(model)], Vec::new()), "scene.xml").unwrap();
         assert_eq!(found.findings[0].code, "base_color_clipped");
         assert!(is_scored_model(&found.scene.materials[0]));
         let float = texture("a.exr", Texels::Linear(vec![[0.5; 3], [0.5; 3], [1.5; 3], [0.5; 3]]));
         let model = scored_model(lookup(0), ScalarInput::Constant(1.5), ScalarInput::Constant(0.0));
         let source = Material { two_sided: true, ..material(model) };
-        let found = convert(scene(vec![source], vec![float]), "scene.xml").unwrap();
+        let found = convert_materials(scene(vec![source], vec![float]), "scene.xml").unwrap();
         assert_eq!(found.findings[0].code, "base_color_clipped");
         assert_eq!(found.scene.textures[0].texture.texel(0, 1), [1.0; 3]);
     }
@@ -561,7 +562,7 @@ mod tests {
         let numbers = [0.5, 0.0].map(ScalarInput::Constant);
         let own = Material { two_sided: true, ..material(scored_model(grey(0.4), numbers[0], numbers[1])) };
         let plain = scene(vec![own.clone()], Vec::new());
-        let found = convert(plain.clone(), "house.json").unwrap();
+        let found = convert_materials(plain.clone(), "house.json").unwrap();
         assert_eq!((found.scene, found.source), (plain, None));
         let MaterialModel::Principled { base_color, roughness, metallic, flavour, .. } = own.model else { panic!() };
         let shiny = MaterialModel::Principled { base_color, roughness, metallic, specular: 0.6, flavour };
@@ -579,7 +580,7 @@ mod tests {
             Material { model: shiny, ..own.clone() },
             Material { model: mitsubas, ..own.clone() },
         ] {
-            let found = convert(scene(vec![twin], Vec::new()), "house.json").unwrap();
+            let found = convert_materials(scene(vec![twin], Vec::new()), "house.json").unwrap();
             assert_eq!(found.scene.materials, std::slice::from_ref(&own));
             assert!(found.source.is_some());
         }
@@ -588,10 +589,11 @@ mod tests {
     #[test]
     fn parameters_out_of_range_are_named() {
         let negative = plastic(-1.5, true, 0.5, 0.1);
-        let error = convert(scene(vec![material(negative)], Vec::new()), "scene.xml").unwrap_err().to_string();
+        let error =
+            convert_materials(scene(vec![material(negative)], Vec::new()), "scene.xml").unwrap_err().to_string();
         assert!(error.contains("'m'"), "{error}");
         let dangling = MaterialModel::Diffuse { reflectance: lookup(3), alpha: None };
-        let found = convert(scene(vec![material(dangling)], Vec::new()), "scene.xml").unwrap().scene;
+        let found = convert_materials(scene(vec![material(dangling)], Vec::new()), "scene.xml").unwrap().scene;
         let surface = Surface {
             name: "s".to_owned(),
             mesh: TriangleMesh {

@@ -18,7 +18,7 @@ use mateval_dataset::open::Dataset;
 use mateval_dataset::reference::ReferenceScene;
 use mateval_dataset::{DatasetError, InstanceId, Progress, Report, SceneId, TriangleMesh, json, manifest, reference};
 use mateval_files::FileError;
-use mateval_files::work_folder::{WorkFolder, check_holds_none};
+use mateval_files::work_folder::{WorkFolder, check_holds_none, make_folder};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
@@ -107,7 +107,7 @@ pub fn perturb(
 fn copy(from: &Path, to: &Path, file: &str) -> Result<(), PrepError> {
     let place = to.join(file);
     if let Some(folder) = place.parent() {
-        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+        make_folder(folder)?;
     }
     Ok(std::fs::copy(from.join(file), &place).map(|_| ()).map_err(FileError::io("write", &place))?)
 }
@@ -165,7 +165,7 @@ fn write_scene(
     }
     // The meshes.
     let folder = to.path().join("geometry");
-    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+    make_folder(&folder)?;
     let motion_of = |id: &InstanceId| {
         let at = scene.instances.iter().position(|instance| instance.id == *id);
         at.and_then(|at| motions[at].as_ref())

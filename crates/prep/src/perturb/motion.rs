@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec3};
 use mateval_dataset::dataset::PerturbationKind;
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::{InstanceId, SceneId, TriangleMesh, splitmix64};
-use mateval_files::untrusted::sha256_of_bytes;
 use mateval_tracer::{Accel, Ray, TracerError};
 
 /// How far a level moves every piece of furniture.
@@ -68,13 +68,12 @@ impl Motion {
         (scene, instance): (&SceneId, &InstanceId),
         mesh: &TriangleMesh,
     ) -> Self {
-        let hash = sha256_of_bytes(format!("{seed}/{scene}/{instance}").as_bytes());
-        let own = u64::from_str_radix(&hash[..16], 16).expect("a hash is hexadecimal");
+        let own = splitmix64::seed_of(&format!("{seed}/{scene}/{instance}"));
         let unit = |index| (splitmix64::number(own, index) >> 11) as f64 / (1_u64 << 53) as f64;
         let sign = if unit(0) < 0.5 { -1.0 } else { 1.0 };
-        let corners = || mesh.triangles.iter().flatten().map(|vertex| mesh.positions[*vertex as usize].as_dvec3());
-        let low = corners().reduce(DVec3::min).unwrap_or_default();
-        let middle = (low + corners().reduce(DVec3::max).unwrap_or_default()) / 2.0;
+        let corners = mesh.triangles.iter().flatten().map(|vertex| mesh.positions[*vertex as usize]);
+        let [low, high] = bounds(corners).unwrap_or_default().map(|corner| corner.as_dvec3());
+        let middle = (low + high) / 2.0;
         match amount {
             Amount::Pose { distance_m, angle_deg } => {
                 let way = TAU * unit(1);

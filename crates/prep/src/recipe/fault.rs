@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mateval_dataset::dataset::SourceKind;
 use mateval_dataset::lighting::LightingName;
 use mateval_dataset::{SceneId, ViewId};
 use mateval_files::FileError;
@@ -66,7 +67,7 @@ impl ValueFault {
 pub enum RecipeSceneFault {
     #[error(transparent)]
     Value(#[from] ValueFault),
-    #[error("expected exactly one of the keys `bitterli`, `front3d`, `gltf`, `blend`, `capture`")]
+    #[error("expected exactly one of the keys {}", source_keys())]
     NotOneSource,
     #[error("a room needs a camera, as in `camera = {{ seed = 1 }}`")]
     NoCamera,
@@ -126,4 +127,8 @@ pub(super) fn check_sizes(
         let expected = format!("{} to {}", ATLAS_SIZES.start(), ATLAS_SIZES.end());
         faults.push(ValueFault::new(format!("{owner}: atlas_size"), found.to_string(), expected).into());
     }
+}
+
+fn source_keys() -> String {
+    SourceKind::ALL.map(|kind| format!("`{kind}`")).join(", ")
 }

@@ -387,13 +387,13 @@ mod tests {
     use mateval_dataset::SceneId;
     use mateval_image::Texels;
 
-    use super::super::secret::Secret;
+    use super::super::secret::RedressKey;
     use super::*;
 
     fn draw(part: &str) -> Draw {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("key"), [3; 32]).unwrap();
-        let secret = Secret::open(&folder.path().join("key"), None, &[]).unwrap();
+        let secret = RedressKey::open(&folder.path().join("key"), None, &[]).unwrap();
         secret.draw(&SceneId::new("a").unwrap(), part)
     }
 

@@ -1,9 +1,9 @@
 //! Redresses a scene: gives every part another material, drawn with a key, so that nobody can rebuild the truth from
 //! public files.
 //!
-//! In: a scene as its reader gives it, and a [`Secret`]. Out: the same scene with other materials, textures and uv, and
-//! [`Redressed`], which lists what is no good secret. Everything after it (conversion, baking, rendering) sees an
-//! ordinary scene.
+//! In: a scene as its reader gives it, and a [`RedressKey`]. Out: the same scene with other materials, textures and uv,
+//! and [`Redressed`], which lists the surfaces whose truth follows from public files. Everything after it (conversion,
+//! baking, rendering) sees an ordinary scene.
 //!
 //! [`surfaces`] finds what each surface is and how it is treated. Parts that look alike and are of one class share a
 //! material, as the legs of a table do; [`materials`] draws it with numbers of [`secret`]. [`charts`] lays the parts of a
@@ -34,14 +34,14 @@ use rayon::prelude::*;
 
 use charts::{Block, Layout, Parts, texel_of};
 use materials::{Drawn, Recoloring, Values};
-pub(crate) use secret::Secret;
+pub(crate) use secret::RedressKey;
 use surfaces::{Place, Treatment, class_of, is_leaf, lamps, place, treatment};
 
 /// Colours of parts that differ by less, in sRGB, look alike.
 const ALIKE: f32 = 0.12;
 /// The most different materials for parts of one class and look.
 const MOST_UNITS: usize = 4;
-/// As of the class of glass.
+/// Roughness of opaque glass, within the range of its class (0.05 to 0.1).
 const GLASS_ROUGHNESS: f64 = 0.08;
 
 /// Parts that share a material.
@@ -67,7 +67,7 @@ struct Laid {
 
 struct Redresser<'a> {
     id: &'a SceneId,
-    secret: &'a Secret,
+    secret: &'a RedressKey,
     scene: &'a mut ReferenceScene,
     /// The source's materials and textures.
     materials: Vec<Material>,
@@ -81,7 +81,7 @@ struct Redresser<'a> {
 }
 
 /// Redresses the scene `id`. Fails where a picture of the private folder cannot be read.
-pub(crate) fn redress(source: &mut SourceScene, id: &SceneId, secret: &Secret) -> Result<WeakAreas, ImageError> {
+pub(crate) fn redress(source: &mut SourceScene, id: &SceneId, secret: &RedressKey) -> Result<WeakAreas, ImageError> {
     let texel_m = texel_of(&source.camera);
     let read = &mut source.read;
     let lamps = lamps(&read.scene, &read.origins);

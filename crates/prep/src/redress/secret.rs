@@ -54,13 +54,13 @@ pub(super) struct TileFiles {
 
 /// A key and the materials that are drawn with it.
 #[derive(Clone)]
-pub(crate) struct Secret {
+pub(crate) struct RedressKey {
     mac: Hmac<Sha256>,
     /// Sorted by name; empty where no folder is given.
     pub(super) tiles: Vec<TileFiles>,
 }
 
-impl Secret {
+impl RedressKey {
     /// Reads the key and lists the folder of materials. Neither may lie in one of the `public` folders.
     pub(crate) fn open(key: &Path, materials: Option<&Path>, public: &[&Path]) -> Result<Self, SecretFault> {
         for path in std::iter::once(key).chain(materials) {
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn keys_are_long_and_private() {
         let (_root, key, public) = folders();
-        let refused = |path: &Path| Secret::open(path, None, &[&public]).err().map(|fault| fault.to_string());
+        let refused = |path: &Path| RedressKey::open(path, None, &[&public]).err().map(|fault| fault.to_string());
         assert_eq!(refused(&key), None);
         std::fs::copy(&key, public.join("key")).unwrap();
         assert!(refused(&public.join("key")).unwrap().contains("which may be published"));
@@ -208,18 +208,18 @@ mod tests {
     fn draws_follow_from_key_scene_and_part() {
         let (_root, key, public) = folders();
         let scene = |name: &str| SceneId::new(name).unwrap();
-        let numbers = |secret: &Secret, id: &str, part: &str| {
+        let numbers = |secret: &RedressKey, id: &str, part: &str| {
             let mut draw = secret.draw(&scene(id), part);
             [(); 100].map(|()| draw.unit())
         };
-        let secret = Secret::open(&key, None, &[&public]).unwrap();
+        let secret = RedressKey::open(&key, None, &[&public]).unwrap();
         let first = numbers(&secret, "a", "p");
         assert_eq!(first, numbers(&secret.clone(), "a", "p"));
         assert!(first.iter().all(|number| (0.0..1.0).contains(number)));
         let mean = first.iter().sum::<f64>() / 100.0;
         assert!((mean - 0.5).abs() < 0.1, "{mean}");
         std::fs::write(&key, [8; 32]).unwrap();
-        let other = Secret::open(&key, None, &[]).unwrap();
+        let other = RedressKey::open(&key, None, &[]).unwrap();
         for numbers in [numbers(&secret, "b", "p"), numbers(&secret, "a", "q"), numbers(&other, "a", "p")] {
             assert_ne!(first, numbers);
         }
@@ -231,7 +231,7 @@ mod tests {
         let (root, key, _) = folders();
         let folder = root.path().join("materials");
         std::fs::create_dir(&folder).unwrap();
-        let open = || Secret::open(&key, Some(&folder), &[]);
+        let open = || RedressKey::open(&key, Some(&folder), &[]);
         assert!(open().err().unwrap().to_string().contains("holds no material"));
         for (name, file) in [
             ("WoodFloor043", "WoodFloor043_1K_Color.jpg"),

@@ -6,17 +6,17 @@
 
 use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::render_file::{DeviceKind, RenderFile, RenderNoise};
-use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, json, reference};
+use mateval_dataset::{Finding, Progress, Report, SceneId, Severity, reference};
 use mateval_files::FileError;
 
 use super::run::{MAX_BOUNCES, RenderReport, RenderRun, ViewRender, seed, seed_texts, write_view};
-use crate::blender::{
+use crate::blender_job::{
     BlenderEvent, BlenderLimits, BlenderProgram, BlenderResult, BlenderView, DeviceChoice, JobFolder, JobPlan, JobView,
     tail,
 };
@@ -62,27 +62,27 @@ pub(super) fn render_scenes(
     scenes: &[&SceneId],
     progress: Progress<'_>,
 ) -> Result<RenderReport, PrepError> {
+    let at_once = options.jobs.clamp(1, scenes.len().max(1));
     let queue: Mutex<VecDeque<usize>> = Mutex::new((0..scenes.len()).collect());
     let done: Mutex<Vec<(usize, Result<RenderReport, PrepError>)>> = Mutex::new(Vec::new());
     let work = |turn: u32| {
-        // A panic of another thread leaves the queue and the list in a valid state.
-        let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front();
+        let next = || lock(&queue).pop_front();
         while let Some(at) = next() {
-            let finished = done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).len();
+            let finished = lock(&done).len();
             progress(Report::part(&format!("scene {}", scenes[at]), finished, scenes.len()));
-            let scene = BlenderScene { run, options, id: scenes[at], turn, progress };
-            done.lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                .push((at, run.on_scene(scenes[at], || scene.render())));
+            let scene = BlenderScene { run, options, id: scenes[at], turn, at_once, progress };
+            // Before the list is locked, or one scene would be rendered at a time.
+            let report = run.on_scene(scenes[at], || scene.render());
+            lock(&done).push((at, report));
         }
     };
     std::thread::scope(|scope| {
-        for turn in 0..options.jobs.clamp(1, scenes.len().max(1)) as u32 {
+        for turn in 0..at_once as u32 {
             let work = &work;
             scope.spawn(move || work(turn));
         }
     });
-    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut done = std::mem::take(&mut *lock(&done));
     done.sort_by_key(|(at, _)| *at);
     let mut all = RenderReport::default();
     for (_, report) in done {
@@ -95,20 +95,26 @@ pub(super) fn render_scenes(
     Ok(all)
 }
 
+/// Locks the queue or the list. A panic of another thread leaves both in a valid state.
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A scene that Blender is to render.
 struct BlenderScene<'a> {
     run: &'a RenderRun<'a>,
     options: &'a BlenderOptions,
     id: &'a SceneId,
-    /// The position of this thread among those that render at once.
+    /// The position of this thread among those that render at once, and their number.
     turn: u32,
+    at_once: usize,
     progress: Progress<'a>,
 }
 
 impl BlenderScene<'_> {
     fn render(&self) -> Result<RenderReport, PrepError> {
         let folder = SceneFolder::of(self.run.root, self.id);
-        let scene: SceneFile = json::read(&folder.scene_file())?;
+        let scene = SceneFile::read(&folder)?;
         let mut report = RenderReport::default();
         let (mut views, mut required_device) = self.views_to_render(&folder, &scene);
         report.kept = scene.views.len() - views.len();
@@ -187,7 +193,7 @@ impl BlenderScene<'_> {
     /// Threads of one process: its share of what this process may use, which on a cluster is less than the node has
     /// (RAYON_NUM_THREADS, or the processors that the job is bound to).
     fn threads(&self) -> u32 {
-        (rayon::current_num_threads() / self.options.jobs.max(1)).max(1) as u32
+        (rayon::current_num_threads() / self.at_once).max(1) as u32
     }
 
     /// Runs Blender once and removes the views that it finished from `views`.

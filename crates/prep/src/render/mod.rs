@@ -15,18 +15,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mateval_dataset::dataset::{SceneFile, View};
-use mateval_dataset::layout::BuildFolder;
-use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder};
+use mateval_dataset::layout::{BuildFolder, DATASET, MANIFEST, SceneFolder};
 use mateval_dataset::open::{chosen_ids, read_dataset_file};
-use mateval_dataset::render_file::RenderNoise;
-use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
+use mateval_dataset::render_file::{RENDER_FILE, RenderFile, RenderNoise};
 use mateval_dataset::{Progress, RendererId, Report, SceneId, json, reference};
 use mateval_image::{exr_io, png_io};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, RenderSettings, RenderStats, World, render_views};
 
-use crate::blender::LightPictures;
-pub use crate::blender::{BlenderLimits, BlenderProgram, DeviceChoice};
+use crate::blender_job::LightPictures;
+pub use crate::blender_job::{BlenderLimits, BlenderProgram, DeviceChoice};
 use crate::build::finish::{check_strays, finish_again};
 use crate::build::start::is_build;
 use crate::error::PrepError;
@@ -142,7 +140,7 @@ fn check_samples(root: &Path, scenes: &[&SceneId], renderer: &RendererId, wanted
     let mut others: Vec<u32> = Vec::new();
     for id in scenes {
         let folder = SceneFolder::of(root, id);
-        let scene: SceneFile = json::read(&folder.scene_file())?;
+        let scene = SceneFile::read(&folder)?;
         let rendered = scene.views.iter().map(|view| folder.render(renderer, &view.id).join(RENDER_FILE));
         let samples = rendered.filter_map(|path| Some(json::read::<RenderFile>(&path).ok()?.samples_each_half));
         others.extend(samples.filter(|samples| *samples != wanted));
@@ -160,7 +158,7 @@ fn without_photos<'a>(
 ) -> Result<(Vec<&'a SceneId>, Vec<&'a SceneId>), PrepError> {
     let (mut rendered, mut photographed) = (Vec::new(), Vec::new());
     for id in scenes {
-        let scene: SceneFile = json::read(&SceneFolder::of(root, id).scene_file())?;
+        let scene = SceneFile::read(&SceneFolder::of(root, id))?;
         if scene.photo.is_some() { photographed.push(id) } else { rendered.push(id) }
     }
     Ok((rendered, photographed))
@@ -183,7 +181,7 @@ fn render_scene(
     report: &mut RenderReport,
 ) -> Result<(), PrepError> {
     let folder = SceneFolder::of(run.root, id);
-    let scene: SceneFile = json::read(&folder.scene_file())?;
+    let scene = SceneFile::read(&folder)?;
     let mut world: Option<World> = None;
     for view in &scene.views {
         let seeds = [0, 1].map(|half| seed(id, view, half));

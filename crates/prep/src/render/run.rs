@@ -9,13 +9,13 @@ use mateval_dataset::dataset::View;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::render_file::{RENDER_FILE, RenderFile};
 use mateval_dataset::scene_cost::{self, Step, TimedStep};
-use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json, word_enum};
+use mateval_dataset::{Finding, RendererId, SceneId, ViewId, json, splitmix64, word_enum};
 use mateval_files::FileError;
-use mateval_files::untrusted::sha256_of_bytes;
+use mateval_files::work_folder::make_folder;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
 
-use crate::blender::{BlenderView, LightPictures};
+use crate::blender_job::{BlenderView, LightPictures};
 use crate::error::PrepError;
 use crate::views::write_preview;
 
@@ -107,8 +107,7 @@ impl RenderRun<'_> {
 /// The seed of one half of a view's picture. The two halves must not share a sequence: their errors would be
 /// correlated.
 pub(super) fn seed(scene: &SceneId, view: &View, half: usize) -> u64 {
-    let text = sha256_of_bytes(format!("{scene}/{}/{half}", view.id).as_bytes());
-    u64::from_str_radix(&text[..16], 16).expect("a hash is hexadecimal")
+    splitmix64::seed_of(&format!("{scene}/{}/{half}", view.id))
 }
 
 /// Seeds as `render.json` holds them.
@@ -133,7 +132,7 @@ pub(super) fn write_view(
     exposure: f64,
     file: &RenderFile,
 ) -> Result<(), PrepError> {
-    std::fs::create_dir_all(place).map_err(FileError::io("make", place))?;
+    make_folder(place)?;
     let mark = place.join(RENDER_FILE);
     if mark.exists() {
         std::fs::remove_file(&mark).map_err(FileError::io("remove", &mark))?;
@@ -168,14 +167,14 @@ fn write_passes(place: &Path, view: &BlenderView) -> Result<(), PrepError> {
 
 /// Whether the renderer has rendered the scene's input view.
 pub(crate) fn can_show_input(folder: &SceneFolder, renderer: &RendererId) -> bool {
-    let input = ViewId::new(INPUT).expect("'input' is a valid id");
+    let input = ViewId::input();
     folder.render(renderer, &input).join(RENDER_FILE).is_file()
 }
 
 /// Copies the renderer's picture of the input view to `views/input/`, as the photo that methods see. Does nothing where
 /// the renderer has not rendered that view.
 pub(crate) fn show_input(folder: &SceneFolder, renderer: &RendererId) -> Result<(), PrepError> {
-    let input = ViewId::new(INPUT).expect("'input' is a valid id");
+    let input = ViewId::input();
     let (from, to) = (folder.render(renderer, &input), folder.view(&input));
     if !can_show_input(folder, renderer) {
         return Ok(());

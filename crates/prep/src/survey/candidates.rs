@@ -6,6 +6,7 @@ use glam::DVec2;
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::camera::{Camera, Intrinsics};
 use mateval_dataset::ids::id_text_from;
+use mateval_dataset::mesh::bounds;
 use mateval_image::Picture;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_sources::front3d::FurnishedHouse;
@@ -72,7 +73,6 @@ impl RoomSearch<'_> {
         let facts = self.facts(room)?;
         let source = &self.house.house.rooms[room];
         let mut rejections = self.options.rules.check(&facts);
-        rejections.extend(self.listed(room));
         let (mut cameras, mut pictures) = (Vec::new(), Vec::new());
         if rejections.is_empty() {
             let (found, refused) = self.cameras(room);
@@ -140,22 +140,9 @@ impl RoomSearch<'_> {
             placed.room == room && placed.origin.role.architecture_kind() == Some("Floor")
         };
         let floors = (0..self.house.placed.len()).filter(is_floor);
-        let positions: Vec<glam::Vec3> =
-            floors.flat_map(|k| self.house.scene.surfaces[k].mesh.positions.iter().copied()).collect();
-        let low = positions.iter().copied().reduce(glam::Vec3::min).unwrap_or_default();
-        let high = positions.iter().copied().reduce(glam::Vec3::max).unwrap_or_default();
+        let positions = floors.flat_map(|k| self.house.scene.surfaces[k].mesh.positions.iter().copied());
+        let [low, high] = bounds(positions).unwrap_or_default();
         [f64::from(high.x - low.x), f64::from(high.z - low.z)]
-    }
-
-    /// A rejection for each list entry that names the room, its house or one of its models.
-    fn listed(&self, room: usize) -> Vec<Rejection> {
-        let lists = &self.options.lists;
-        let jids: BTreeSet<&str> = (0..self.house.placed.len())
-            .filter(|&k| self.house.placed[k].room == room)
-            .filter_map(|k| self.house.placed[k].model.as_ref().map(|model| model.jid.as_str()))
-            .collect();
-        let ids = [self.house.house.rooms[room].id.as_str(), self.house.house.uid.as_str()];
-        ids.into_iter().chain(jids).filter_map(|id| lists.reason(id)).collect()
     }
 
     /// The drawn cameras and the designers' cameras in this room that break no rule, the best score first; and the
@@ -277,9 +264,9 @@ fn thumbnail_camera(camera: &Camera) -> Camera {
 /// A camera and where it comes from.
 struct Posed {
     /// As in `seed 3` or `designer 5`.
-    pub(super) origin: String,
-    pub(super) camera: Camera,
-    pub(super) fov_y_deg: f64,
+    origin: String,
+    camera: Camera,
+    fov_y_deg: f64,
 }
 
 /// Draws the cameras of one house.
@@ -294,12 +281,7 @@ struct CameraDraws<'a> {
 }
 
 impl<'a> CameraDraws<'a> {
-    pub(super) fn new(
-        options: &'a SurveyOptions,
-        house: &'a FurnishedHouse,
-        world: &'a World,
-        views: &[Offset],
-    ) -> Self {
+    fn new(options: &'a SurveyOptions, house: &'a FurnishedHouse, world: &'a World, views: &[Offset]) -> Self {
         let turns = views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
         let samplers = (0..house.house.rooms.len()).filter_map(|room| RoomSampler::new(house, world, room).ok());
         let areas = samplers.map(|sampler| sampler.floor_area_m2()).collect();
@@ -366,8 +348,8 @@ impl<'a> CameraDraws<'a> {
 #[derive(Clone, Debug, PartialEq)]
 struct RefusedCamera {
     /// Where the camera comes from, as in `seed 3`; absent if no camera can be drawn in the room at all.
-    pub(super) origin: Option<String>,
-    pub(super) why: CameraRefusal,
+    origin: Option<String>,
+    why: CameraRefusal,
 }
 
 /// The rule that a camera breaks.

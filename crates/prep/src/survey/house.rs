@@ -11,8 +11,9 @@ use mateval_dataset::dataset::SourceFile;
 use mateval_dataset::{FindingCount, ids, json};
 use mateval_files::FileError;
 use mateval_files::lease::{Lease, LeaseSet};
+use mateval_files::source_folder::slashed;
 use mateval_files::untrusted::{sha256_of_bytes, sha256_of_file};
-use mateval_files::work_folder::{WorkFolder, check_free, remove, remove_beside};
+use mateval_files::work_folder::{WorkFolder, check_free, make_folder, remove, remove_beside};
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_sources::front3d::{self, AppearanceRule, FurnishedHouse, HouseFiles};
 use serde::{Deserialize, Serialize};
@@ -55,7 +56,7 @@ impl<'a> HouseSearch<'a> {
 
     /// Makes the part of a house; returns whether an earlier run had made it, with the same settings and files.
     pub(super) fn find(&mut self, house: &Path) -> Result<bool, PrepError> {
-        let shown = shown(house);
+        let shown = slashed(house);
         let name = HouseName::new(&shown);
         let path = self.folder.part(&name);
         let found = json::read::<HousePart>(&path).ok();
@@ -103,7 +104,7 @@ impl<'a> HouseSearch<'a> {
             files: Vec::new(),
             absent: Vec::new(),
             house: SurveyedHouse {
-                file: shown(house),
+                file: slashed(house),
                 uid: None,
                 error: None,
                 findings: Vec::new(),
@@ -147,11 +148,6 @@ impl<'a> HouseSearch<'a> {
     }
 }
 
-/// A house's file as the survey shows it.
-pub(super) fn shown(house: &Path) -> String {
-    house.to_string_lossy().replace('\\', "/")
-}
-
 /// The name of the folder that only the survey itself reads.
 const WORK: &str = ".survey";
 
@@ -175,7 +171,7 @@ impl SurveyFolder {
         folder.check_place(force)?;
         let work = folder.0.join(WORK);
         for path in [folder.parts(), folder.0.join(THUMBNAILS)] {
-            std::fs::create_dir_all(&path).map_err(FileError::io("make", &path))?;
+            make_folder(&path)?;
         }
         json::write(&work.join("key.json"), &WorkKey { format: KEY_FORMAT.to_owned() })?;
         Ok(folder)

@@ -157,7 +157,7 @@ struct Solid<'a> {
 }
 
 impl<'a> Solid<'a> {
-    pub(super) fn new(mesh: &'a TriangleMesh) -> Result<Self, TracerError> {
+    fn new(mesh: &'a TriangleMesh) -> Result<Self, TracerError> {
         let accel = Accel::build(&[mesh])?;
         Ok(Self { mesh, accel, on_surface: OnceLock::new(), enclosed: OnceLock::new() })
     }

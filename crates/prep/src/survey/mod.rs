@@ -1,6 +1,6 @@
 //! Searches houses for rooms that could become scenes, and chooses scenes among them.
 //!
-//! In: houses, models, textures, rules, lists. Out: a folder with [`SurveyFile`], which lists every room, why it was
+//! In: houses, models, textures, rules. Out: a folder with [`SurveyFile`], which lists every room, why it was
 //! rejected or which cameras it offers; thumbnails; an HTML page to pick from; and a recipe that pins the SHA-256 of
 //! every input. Rooms and cameras depend on the houses and the seed alone, whether all houses are searched at once, by
 //! a run that was resumed, or by several processes.
@@ -22,11 +22,11 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::{Progress, Report};
 use mateval_files::FileError;
-use mateval_files::source_folder::{common_folder, relative_below};
+use mateval_files::source_folder::{common_folder, relative_below, slashed};
 
 use crate::error::PrepError;
-use crate::redress::Secret;
-use house::{HouseName, HouseSearch, SurveyFolder, shown};
+use crate::redress::RedressKey;
+use house::{HouseName, HouseSearch, SurveyFolder};
 use output::merge;
 pub use rules::SurveyOptions;
 pub use survey_file::{
@@ -53,7 +53,7 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
     check_folders(options)?;
     let source = source_folder(options)?;
     if let Some(key) = &options.redress {
-        Secret::open(key, None, &[&source, &options.out])?;
+        RedressKey::open(key, None, &[&source, &options.out])?;
     }
     let options = &relative_to(&source, options)?;
     let houses = house_files(options, &source)?;
@@ -76,7 +76,7 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
 
 /// Searches one house while other processes may search others. Returns whether an earlier run has.
 fn search_apart(search: &mut HouseSearch<'_>, house: &Path) -> Result<bool, PrepError> {
-    let _lease = search.folder.lease_of_house(&HouseName::new(&shown(house)))?;
+    let _lease = search.folder.lease_of_house(&HouseName::new(&slashed(house)))?;
     search.folder.reopen(search.options.force)?;
     search.find(house)
 }

@@ -8,13 +8,15 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SourceFile;
+use mateval_dataset::ids::unused_name;
 use mateval_dataset::json;
+use mateval_files::source_folder::slashed;
 use mateval_files::whole::write_whole;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::house::{HouseName, HousePart, SurveyFolder, shown};
+use super::house::{HouseName, HousePart, SurveyFolder};
 use super::rules::SurveyOptions;
 use super::selection::{rank, select};
 use super::survey_file::{CandidateCamera, SURVEY, SURVEY_FORMAT, SurveyFile, SurveyedHouse};
@@ -42,12 +44,12 @@ pub(super) fn merge(
     };
     let mut taken = BTreeSet::new();
     for house in houses {
-        let part: HousePart = json::read(&folder.part(&HouseName::new(&shown(house))))?;
+        let part: HousePart = json::read(&folder.part(&HouseName::new(&slashed(house))))?;
         file.houses.push(named(part, options, &mut taken, &mut texts));
     }
     rank(&mut file.houses);
     file.selection = options.goal.map(|goal| select(&mut file.houses, &goal));
-    let names: Vec<HouseName> = houses.iter().map(|house| HouseName::new(&shown(house))).collect();
+    let names: Vec<HouseName> = houses.iter().map(|house| HouseName::new(&slashed(house))).collect();
     folder.keep_only(&names)?;
     write_whole(&folder.file(RECIPE), texts.of_best(&file).as_bytes())?;
     write_whole(&folder.file(PAGE), page(&file, &texts).as_bytes())?;
@@ -65,7 +67,8 @@ fn named(
     let HousePart { mut house, files, .. } = part;
     for room in &mut house.rooms {
         for camera in &mut room.cameras {
-            camera.scene = free_id(&camera.scene, taken);
+            // The names of several rooms may be shortened to the same id.
+            camera.scene = unused_name(&camera.scene, '-', taken);
             let text = scene_text(options, &house.file, &room.room, camera);
             texts.scenes.insert(camera.scene.clone(), text);
         }
@@ -76,29 +79,20 @@ fn named(
     house
 }
 
-/// The id, with a number appended where it is taken: the names of several rooms may be shortened to the same id.
-fn free_id(id: &str, taken: &mut BTreeSet<String>) -> String {
-    let numbered = (2..).map(|number| format!("{id}-{number}"));
-    let free = std::iter::once(id.to_owned()).chain(numbered).find(|id| !taken.contains(id));
-    let free = free.expect("ids are finitely many");
-    taken.insert(free.clone());
-    free
-}
-
 /// Pieces of recipes, from which the page joins a recipe of whatever is picked.
 #[derive(Debug, Default, Serialize)]
 struct RecipeTexts {
     /// The lines before the first scene.
-    pub(super) head: String,
+    head: String,
     /// The text of each scene without its inputs, by the scene's id.
-    pub(super) scenes: BTreeMap<String, String>,
+    scenes: BTreeMap<String, String>,
     /// The inputs of each house's scenes, by the house's file.
-    pub(super) inputs: BTreeMap<String, String>,
+    inputs: BTreeMap<String, String>,
 }
 
 impl RecipeTexts {
     /// The texts of a survey that has found nothing yet.
-    pub(super) fn new(options: &SurveyOptions) -> Self {
+    fn new(options: &SurveyOptions) -> Self {
         Self { head: head_text(options), ..Default::default() }
     }
 
@@ -129,7 +123,7 @@ fn head_text(options: &SurveyOptions) -> String {
 
 /// A scene without its inputs, which follow it.
 fn scene_text(options: &SurveyOptions, house: &str, room: &str, camera: &CandidateCamera) -> String {
-    let shown = |path: &Path| quoted(&path.to_string_lossy().replace('\\', "/"));
+    let shown = |path: &Path| quoted(&slashed(path));
     let mut keys = format!("house = {}, room = {}, models = {}", quoted(house), quoted(room), shown(&options.models));
     for (key, path) in [("textures", &options.textures), ("cameras", &options.cameras)] {
         if let Some(path) = path {
@@ -183,13 +177,6 @@ fn page(survey: &SurveyFile, texts: &RecipeTexts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_id_is_unique() {
-        let mut taken = BTreeSet::new();
-        let ids = ["a", "a", "b", "a", "a-2"].map(|id| free_id(id, &mut taken));
-        assert_eq!(ids, ["a", "a-2", "b", "a-3", "a-2-2"]);
-    }
 
     #[test]
     fn any_file_name_is_a_key_that_reads_back() {

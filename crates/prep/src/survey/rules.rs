@@ -1,12 +1,10 @@
 //! What a survey is asked for, and which rooms become scenes.
 //!
-//! The conditions are limits in a TOML file, and lists of rooms, houses and models that are known to be bad.
+//! The conditions are limits in a TOML file.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_files::FileError;
-use mateval_files::untrusted::{read_at_most, sha256_of_bytes};
+use mateval_files::untrusted::sha256_of_bytes;
 use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
@@ -30,8 +28,6 @@ pub struct SurveyOptions {
     pub cameras: Option<PathBuf>,
     /// Conditions that a room must meet.
     pub rules: SelectionRules,
-    /// Rooms, houses and models that are known to be bad.
-    pub lists: RejectionLists,
     /// The rules that drawn cameras keep.
     pub camera_rules: CameraRules,
     /// Seed of the drawn cameras.
@@ -59,9 +55,9 @@ impl SurveyOptions {
     pub(super) fn sha256(&self, tool: &str) -> String {
         // Every setting is printed with all its fields. The text is read by nobody, and the tool's version stands in
         // it.
-        let Self { source: _, houses: _, models, textures, cameras, rules, lists, .. } = self;
+        let Self { source: _, houses: _, models, textures, cameras, rules, .. } = self;
         let Self { camera_rules, seed, cameras_per_room, resolution, fov_y_deg, only: _, goal: _, .. } = self;
-        let files = format!("{models:?}\n{textures:?}\n{cameras:?}\n{rules:?}\n{lists:?}");
+        let files = format!("{models:?}\n{textures:?}\n{cameras:?}\n{rules:?}");
         let cameras = format!("{camera_rules}\n{seed}\n{cameras_per_room}\n{resolution:?}\n{fov_y_deg:?}");
         sha256_of_bytes(format!("{tool}\n{SURVEY_FORMAT}\n{files}\n{cameras}").as_bytes())
     }
@@ -186,42 +182,6 @@ impl SelectionRules {
     }
 }
 
-/// Ids of rooms, houses and models that are not to be used, each with a reason.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct RejectionLists {
-    reasons: BTreeMap<String, String>,
-}
-
-/// Size of the largest list that is read, in bytes.
-const MAX_LIST_BYTES: u64 = 64 << 20;
-/// Largest number of rows of all lists together.
-const MAX_ROWS: usize = 1_000_000;
-
-impl RejectionLists {
-    /// Adds a CSV file of rows `id,reason`. The reason is optional; lines that begin with `#` are comments.
-    pub fn add(&mut self, path: &Path) -> Result<(), PrepError> {
-        let rows = read_at_most(path, MAX_LIST_BYTES).map_err(FileError::io("read", path))?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let mut reader =
-            csv::ReaderBuilder::new().has_headers(false).flexible(true).comment(Some(b'#')).from_reader(&*rows);
-        for row in reader.records() {
-            let row = row.map_err(|source| PrepError::List { path: path.to_owned(), source })?;
-            let Some(id) = row.get(0).map(str::trim).filter(|id| !id.is_empty()) else { continue };
-            let reason = row.get(1).map(str::trim).filter(|reason| !reason.is_empty()).unwrap_or("no reason given");
-            if self.reasons.len() >= MAX_ROWS {
-                return Err(PrepError::LongLists { path: path.to_owned(), most: MAX_ROWS });
-            }
-            self.reasons.entry(id.to_owned()).or_insert_with(|| format!("'{id}' is in {name}: {reason}"));
-        }
-        Ok(())
-    }
-
-    /// The rejection of a listed id; absent if the id is on no list.
-    pub(super) fn reason(&self, id: &str) -> Option<Rejection> {
-        self.reasons.get(id).map(|reason| Rejection::new("listed", reason.clone()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,20 +208,6 @@ mod tests {
         assert_eq!(pair(0.1, 0.1), "");
         assert_eq!(broken(RoomFacts { missing: 1, ..good() }), "max_missing");
         assert_eq!(broken(RoomFacts { missing: 1, objects: 0, ..good() }), "min_objects max_missing");
-    }
-
-    #[test]
-    fn lists_are_rows_of_id_and_reason() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("bad.csv");
-        std::fs::write(&path, "# rooms\nRoom-1,\"chairs, in tables\"\nRoom-2\n\n").unwrap();
-        let mut lists = RejectionLists::default();
-        lists.add(&path).unwrap();
-        assert_eq!(lists.reason("Room-1").unwrap().reason, "'Room-1' is in bad.csv: chairs, in tables");
-        assert_eq!(lists.reason("Room-2").unwrap().reason, "'Room-2' is in bad.csv: no reason given");
-        assert_eq!(lists.reason("# rooms"), None);
-        assert!(lists.add(&folder.path().join("none.csv")).is_err());
-        assert!(cfg!(not(unix)) || lists.add(Path::new("/dev/zero")).is_err());
     }
 
     #[test]

@@ -177,7 +177,7 @@ impl std::fmt::Display for IntersectingPair {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rejection {
-    /// The key of the rule, `listed` or `no_camera`.
+    /// The key of the rule, or `no_camera`.
     pub rule: String,
     /// What was expected and what was found.
     pub reason: String,

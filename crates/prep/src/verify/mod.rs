@@ -8,12 +8,9 @@ mod twin;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::scene_meshes;
-use crate::scene_meshes::Faults;
 use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_dataset::ids::quoted;
-use mateval_dataset::layout::BuildFolder;
-use mateval_dataset::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
+use mateval_dataset::layout::{BuildFolder, DATASET, MANIFEST, SceneFolder, TARGETS};
 use mateval_dataset::manifest::is_withheld;
 use mateval_dataset::material::MaterialClassesFile;
 use mateval_dataset::open::{absent_scenes, is_below, read_dataset_file};
@@ -23,6 +20,7 @@ use mateval_tracer::World;
 
 use self::scene::{check_scene_file, check_schema, read_json};
 use crate::error::PrepError;
+use crate::scene_meshes::{self, Faults};
 
 /// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound
 /// dataset has no finding of severity `error`. Fails where the folder contains no dataset.

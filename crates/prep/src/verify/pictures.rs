@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use crate::scene_meshes::Faults;
-use crate::scene_meshes::Meshes;
-use crate::views::{SeenTriangle, ViewPixel, ViewScene};
 use mateval_dataset::dataset::{SceneFile, View};
 use mateval_dataset::layout::{INPUT, SceneFolder, part_picture};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_tracer::World;
 use rayon::prelude::*;
+
+use crate::scene_meshes::{Faults, Meshes};
+use crate::views::{SeenTriangle, ViewPixel, ViewScene};
 
 /// Distance between the columns and rows that are traced again. It is prime, so that no regular pattern escapes the
 /// check.

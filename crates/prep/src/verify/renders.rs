@@ -4,16 +4,15 @@
 
 use std::path::Path;
 
-use crate::scene_meshes::Faults;
 use mateval_dataset::dataset::{DatasetFile, Photo, SceneFile};
 use mateval_dataset::layout::{INPUT, SCORER_JSON, SceneFolder};
-use mateval_dataset::render_file::RenderFile;
-use mateval_dataset::render_file::{SCORER_FORMAT, ScorerFile, light_inputs_sha256};
+use mateval_dataset::render_file::{RenderFile, SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_dataset::{Finding, RendererId, Severity, json};
 use mateval_files::untrusted::sha256_of_file;
 use mateval_image::{LinearRgb, exr_io};
 
 use super::scene::check_schema;
+use crate::scene_meshes::Faults;
 
 /// Radiance times exposure below which every channel of an 8-bit sRGB picture is 0: half a step of the linear part of
 /// the transfer curve.
@@ -36,9 +35,10 @@ fn check_light(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
 /// kind of device than the first view's.
 pub(super) fn check_renders(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
     check_light(folder, scene, faults);
+    let has_truth = folder.truth().is_dir();
     let mut first_device = None;
     for view in &scene.views {
-        if folder.truth().is_dir() {
+        if has_truth {
             let file = format!("ground_truth/renders/{renderer}/{}/render.json", view.id);
             check_schema::<RenderFile>(folder.path(), &file, faults);
             // One that cannot be read has been reported.
@@ -53,18 +53,15 @@ pub(super) fn check_renders(folder: &SceneFolder, scene: &SceneFile, renderer: &
                     faults.add("mixed_devices", &file, "/device", message);
                 }
             }
-        }
-        let k = view.camera.intrinsics;
-        let expected = (k.width as usize, k.height as usize);
-        for name in ["rgb_a.exr", "rgb_b.exr", "rgb.exr"] {
-            let file = format!("ground_truth/renders/{renderer}/{}/{name}", view.id);
-            let path = folder.render(renderer, &view.id).join(name);
-            if !folder.truth().is_dir() {
-                continue;
-            }
-            let Some(picture) = faults.read(&file, exr_io::read_linear(&path)) else { continue };
-            if (picture.width(), picture.height()) != expected {
-                faults.add("wrong_size", &file, "", format!("expected {}x{} pixels", expected.0, expected.1));
+            let k = view.camera.intrinsics;
+            let expected = (k.width as usize, k.height as usize);
+            for name in ["rgb_a.exr", "rgb_b.exr", "rgb.exr"] {
+                let file = format!("ground_truth/renders/{renderer}/{}/{name}", view.id);
+                let path = folder.render(renderer, &view.id).join(name);
+                let Some(picture) = faults.read(&file, exr_io::read_linear(&path)) else { continue };
+                if (picture.width(), picture.height()) != expected {
+                    faults.add("wrong_size", &file, "", format!("expected {}x{} pixels", expected.0, expected.1));
+                }
             }
         }
         if view.id.as_str() == INPUT {

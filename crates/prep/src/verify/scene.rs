@@ -5,8 +5,6 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::scene_meshes::Faults;
-use crate::scene_meshes::Meshes;
 use glam::DMat3;
 use mateval_dataset::dataset::{FORMAT, Part, SceneFile, View, WideView};
 use mateval_dataset::glb::GlbNode;
@@ -16,11 +14,12 @@ use mateval_dataset::measured::{MeasuredFile, color_fault};
 use mateval_dataset::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_dataset::submission::Map;
 use mateval_dataset::{Camera, DatasetError, SourceKind, ViewId, json};
-use mateval_image::Wrap;
-use mateval_image::png_io;
 use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{Wrap, png_io};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
+
+use crate::scene_meshes::{Faults, Meshes};
 
 /// Checks `folder/file` against the schema of `T`. Every violation is a fault with its JSON pointer.
 pub(super) fn check_schema<T: JsonSchema>(folder: &Path, file: &str, faults: &mut Faults) {

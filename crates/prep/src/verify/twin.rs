@@ -58,7 +58,7 @@ pub(super) fn check(root: &Path, id: &SceneId, twin: &Twin, dataset: &DatasetFil
         }
     }
     // Without renders, such as in the public part of a hidden split, there is nothing to compare the photo with.
-    let input = ViewId::new(INPUT).expect("'input' is a valid id");
+    let input = ViewId::input();
     let Some(renderer) = dataset.photo_renderer.as_ref().filter(|id| of.render(id, &input).is_dir()) else { return };
     let photo_file = format!("views/{INPUT}/rgb.exr");
     let Some(made) = faults.read(&photo_file, photo(&of, &scene, renderer, twin.lighting)) else { return };

@@ -91,9 +91,42 @@ const RANDOM: usize = 5;
 /// How many of those are refined from two starts.
 const TWICE: usize = 2;
 
-/// The fit of a part. What is random in a graph has its look and not its place, so that a texture of variance s^2 adds
-/// s^2 to the mean square of the differences from what is seen; [`Candidate::with_detail`] removes as much as is
-/// wanted.
+/// How many waves of each order are sought in the points, from which all patterns start.
+const WAVES: usize = 8;
+
+/// Points in which waves are sought, once a part.
+const WAVE_POINTS: usize = 4096;
+
+/// Points to which a candidate is fitted last, and by which its cells are judged.
+const FINAL_POINTS: usize = 2048;
+
+/// Points by which starts are judged and to which they are polished: every pattern has several, which are fitted to
+/// few points each to save time.
+const START_POINTS: usize = 700;
+
+/// Points by which the place and the size of cells are searched, which evaluates the most settings.
+const CELL_POINTS: usize = 500;
+
+/// The most steps of a start's fit, which only orders the starts.
+const START_STEPS: usize = 8;
+
+/// The most steps of a candidate's fit.
+const FINAL_STEPS: usize = 20;
+
+/// Fewer held-out points than this cannot judge a fit, so that only the single colour is fitted.
+const LEAST_HELD_OUT: usize = LEAST_POINTS / 8;
+
+/// Smaller mean squares count as this one, so that logarithms and ratios are finite.
+const LEAST_SQUARE: f64 = 1e-12;
+
+/// Added to the ratio of a graph's error to that of a single colour, so that an exact fit is not infinitely better than a good one.
+const EXACT: f64 = 1e-3;
+
+/// Rows that are shifted by less than this share of a brick count as not shifted.
+const LEAST_SHIFT: f64 = 0.03;
+
+/// The fit of a part. A graph matches what is random only statistically, so a texture of variance s^2 adds s^2 to the
+/// mean squared difference; [`Candidate::with_detail`] removes as much as is wanted.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The graph that was chosen; `paint` where none is better than a colour.
@@ -148,8 +181,8 @@ impl Fitter {
         let sound = sound(points)?;
         let sound = flattened(&sound);
         let (seen, held_out) = split(&sound);
-        // Too few points to hold some out: only the single colour is fitted, to all of them.
-        let is_enough = seen.len() >= LEAST_POINTS && held_out.len() >= LEAST_POINTS / 8;
+        // Where too few points are held out, the single colour is fitted to all of them.
+        let is_enough = seen.len() >= LEAST_POINTS && held_out.len() >= LEAST_HELD_OUT;
         let judged = if is_enough { held_out } else { sound.clone() };
         let mut paint = self.painted(if is_enough { &seen } else { &sound }, &judged);
         if !is_enough || paint.error < LEAST_VARIANCE {
@@ -187,25 +220,26 @@ impl Fitter {
     /// The best fit of each promising pattern; the best ones also with what is random in them.
     fn fitted(&self, seen: &[Point], judged: &[Point], sight: &Sight) -> Vec<Candidate> {
         let mut all: Vec<(&Model, Candidate)> = Vec::new();
-        for (pattern, starts) in self.begun(seen) {
+        for (pattern, starts) in self.promising_patterns(seen) {
             all.extend(candidate(pattern, seen, judged, starts).map(|candidate| (&pattern.model, candidate)));
         }
-        let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
+        let promise = |candidate: &Candidate| libm::log(candidate.error.max(LEAST_SQUARE)) + candidate.cells;
         all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
         all.truncate(PERIODIC);
         all.into_iter().map(|(model, candidate)| with_random(sight, model, candidate)).collect()
     }
 
     /// The patterns whose best start is most promising, with their starts.
-    fn begun(&self, seen: &[Point]) -> Vec<(&Pattern, Vec<Start>)> {
-        let few = thinned(seen, 4096);
-        let strong = waves(&few, 8, Order::Power);
+    fn promising_patterns(&self, seen: &[Point]) -> Vec<(&Pattern, Vec<Start>)> {
+        let few = thinned(seen, WAVE_POINTS);
+        let strong = waves(&few, WAVES, Order::Power);
         // The joints of cells stand out against waves of similar period, not by their power.
-        let sharp = waves(&few, 8, Order::Contrast);
+        let sharp = waves(&few, WAVES, Order::Contrast);
         let both = [strong.as_slice(), &sharp];
         let of = |pattern: &Pattern| if pattern.model.tone.is_some() { &both } else { &both[..1] };
-        let fewer = thinned(seen, 700);
-        let with_starts = |pattern| begun(pattern, seen, &fewer, of(pattern)).map(|(best, all)| (best, pattern, all));
+        let fewer = thinned(seen, START_POINTS);
+        let with_starts =
+            |pattern| promising_starts(pattern, seen, &fewer, of(pattern)).map(|(best, all)| (best, pattern, all));
         let mut all: Vec<(f64, &Pattern, Vec<Start>)> = self.patterns.iter().filter_map(with_starts).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         all.truncate(POLISHED);
@@ -243,7 +277,7 @@ impl Fitter {
 /// how far statistics are, how many numbers a graph has, how unusual its sizes are, and whether things of the category
 /// are often made of it.
 fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
-    let pixels = PIXELS * (libm::log(candidate.error / of_paint.max(1e-12) + 1e-3) + candidate.cells);
+    let pixels = PIXELS * (libm::log(candidate.error / of_paint.max(LEAST_SQUARE) + EXACT) + candidate.cells);
     let pixels = if pixels > 0.0 { pixels } else { (pixels + BY_CHANCE).min(0.0) };
     let sizes = candidate.class.map_or(0.0, |_| unusual(&candidate.graph, &candidate.settings));
     let price = PRICE * candidate.settings.numbers().len() as f64 + SIZES * sizes;
@@ -273,7 +307,7 @@ fn with_random(sight: &Sight, model: &Model, mut candidate: Candidate) -> Candid
 
 /// The starts of a pattern, the best first, after the logarithm of the best one's error in that of a single colour.
 /// `None` where none is promising.
-fn begun(pattern: &Pattern, seen: &[Point], few: &[Point], found: &[&[Wave]]) -> Option<(f64, Vec<Start>)> {
+fn promising_starts(pattern: &Pattern, seen: &[Point], few: &[Point], found: &[&[Wave]]) -> Option<(f64, Vec<Start>)> {
     let model = &pattern.model;
     let most = STARTS / found.len();
     let mut all: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
@@ -286,21 +320,21 @@ fn begun(pattern: &Pattern, seen: &[Point], few: &[Point], found: &[&[Wave]]) ->
 /// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
 fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], starts: Vec<Start>) -> Option<Candidate> {
     let model = &pattern.model;
-    let (few, many, fewer) = (thinned(seen, 700), thinned(seen, 2048), thinned(seen, 500));
+    let (few, many, fewer) = (thinned(seen, START_POINTS), thinned(seen, FINAL_POINTS), thinned(seen, CELL_POINTS));
     // The place of cells is searched, and what that leads to is polished.
     let polished = starts.into_iter().enumerate().map(|(place, mut start)| {
         if place < SETTLED {
             start.settings = settled(model, pattern.layout, start.settings, &fewer);
         }
         let toneless = without_tones(model, &start.settings, &few);
-        polish(model, &mut start.settings, &toneless, 8);
+        polish(model, &mut start.settings, &toneless, START_STEPS);
         let error = mean_square(model, &start.settings, &without_tones(model, &start.settings, &few));
         (cell_error(model, &start.settings, &many).unwrap_or(error), start.settings)
     });
     let (_, mut settings) = polished.min_by(|a, b| a.0.total_cmp(&b.0))?;
     for round in 0..if model.tone.is_some() { ROUNDS } else { 1 } {
         let toneless = without_tones(model, &settings, &many);
-        polish(model, &mut settings, &toneless, 20);
+        polish(model, &mut settings, &toneless, FINAL_STEPS);
         let resized = if round + 1 < ROUNDS { better(model, pattern.layout, &settings, &fewer) } else { None };
         match resized {
             Some(resized) => settings = resized,
@@ -322,11 +356,11 @@ fn gain(model: &Model, start: &Start, few: &[Point]) -> f64 {
     let mean: [f64; 3] = std::array::from_fn(|c| few.iter().map(|point| point.albedo[c]).sum::<f64>() / count);
     let square = |point: &Point| (0..3).map(|c| (point.albedo[c] - mean[c]).powi(2)).sum::<f64>() / 3.0;
     let of_one = few.iter().map(square).sum::<f64>() / count;
-    libm::log(mean_square(model, &start.settings, few).max(1e-12) / of_one.max(1e-12))
+    libm::log(mean_square(model, &start.settings, few).max(LEAST_SQUARE) / of_one.max(LEAST_SQUARE))
 }
 
 /// Bricks that are not shifted from row to row are tiles.
 fn is_a_tile(model: &Model, settings: &Settings) -> bool {
     let shift = model.slot("row_shift").filter(|_| model.slot("edge_wear").is_some()).map(|at| settings.numbers()[at]);
-    shift.is_some_and(|shift| (shift - shift.round()).abs() < 0.03)
+    shift.is_some_and(|shift| (shift - shift.round()).abs() < LEAST_SHIFT)
 }

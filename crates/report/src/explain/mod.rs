@@ -19,14 +19,13 @@ use mateval_dataset::dataset::Instance;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Finding, Progress, Report, SceneId, ViewId};
 use mateval_eval::metric::{Metric, PictureKind};
-use mateval_eval::open_scene::scored_views;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::shown::{SceneAlbedo, scene_albedo};
-use mateval_files::FileError;
+use mateval_eval::truth::scored_views;
 use mateval_files::whole::write_whole;
-use mateval_files::work_folder::check_free;
+use mateval_files::work_folder::{check_free, make_folder};
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_metrics::Psnr;
@@ -167,7 +166,7 @@ impl Explanation {
         let page = out.join(PAGE);
         let paths: Vec<PathBuf> = names.iter().map(|name| out.join(name)).chain([page.clone()]).collect();
         paths.iter().try_for_each(|path| check_free(path, force, "--out"))?;
-        std::fs::create_dir_all(out).map_err(FileError::io("make", out))?;
+        make_folder(out)?;
         for (index, path) in self.worst.iter().zip(&paths) {
             png_io::write_rgb_bytes(path, &crop(&self.views, &self.patches[index]))?;
         }

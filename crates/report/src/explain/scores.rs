@@ -11,7 +11,7 @@ use mateval_eval::result::ProtocolResult;
 use mateval_eval::result::key::Views;
 use mateval_eval::shown::SceneAlbedo;
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_metrics::alignment::scaled;
+use mateval_metrics::scaled;
 use mateval_metrics::{MetricError, Psnr};
 
 use super::file::{AlignedBy, AlignmentScores, LightShare};

@@ -118,15 +118,7 @@ impl<'a> Board<'a> {
 /// The datasets among `trained_on` that scenes of these sources come from: a method may have seen their truth.
 fn overlap<'a>(trained_on: &[String], sources: impl Iterator<Item = &'a SourceKind>) -> Vec<String> {
     let plain = |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
-    let names: Vec<&str> = sources
-        .flat_map(|kind| match kind {
-            // 3D-FRONT's furniture is 3D-FUTURE's.
-            SourceKind::Front3d => ["3dfront", "3dfuture"].as_slice(),
-            SourceKind::Bitterli => &["bitterli"],
-            _ => &[],
-        })
-        .copied()
-        .collect();
+    let names: Vec<&str> = sources.flat_map(|kind| kind.datasets()).copied().collect();
     trained_on.iter().filter(|trained| names.iter().any(|name| plain(trained).contains(name))).cloned().collect()
 }
 

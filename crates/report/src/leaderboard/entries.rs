@@ -175,6 +175,7 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
     if findings.is_empty() { Ok(entries) } else { Err(ReportError::UnfitFiles(findings)) }
 }
 
+/// What a site is made from, and what it shows.
 pub struct LeaderboardPlan<'a> {
     pub results: &'a [ResultFile],
     /// The result of the truth itself, which is shown below the methods and not ranked.

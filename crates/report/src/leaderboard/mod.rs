@@ -1,7 +1,7 @@
 //! The leaderboard as a static site that opens from the disk.
 //!
 //! In: results under one protocol, and optionally pictures. Out: a folder with pages for the board, for each method and
-//! scene, for the protocol, the paper's own numbers and errata, and with the numbers as files.
+//! scene, for the protocol and errata, and with the numbers as files.
 //!
 //! `entries` lists the files of a folder, reads them and refuses those that cannot make a board. `pictures` and `rooms`
 //! gather what is shown beside numbers. `board` holds all of it, with the `columns` of scores and facts about methods.
@@ -34,6 +34,7 @@ use mateval_files::work_folder::{WorkFolder, check_free};
 use self::board::Board;
 pub use self::entries::{LeaderboardPlan, Submissions};
 use self::file::LEADERBOARD_PATH;
+pub use self::pictures::keep_seen;
 use self::site::{CONSTANCY, PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
@@ -118,7 +119,7 @@ mod tests {
 
     use mateval_dataset::json;
     use mateval_dataset::submission::Cost;
-    use mateval_eval::result::constancy::{Constancy, Deviation};
+    use mateval_eval::result::{Constancy, Deviation};
     use mateval_eval::result::{ResultFile, TracerCheck};
     use mateval_image::{Picture, png_io};
 
@@ -194,7 +195,6 @@ mod tests {
         assert!(scene.contains("There is no 3D view") && !out.join("rooms").exists());
         assert!(text("protocol.html").contains(&results[0].protocols["mateval-3"].fingerprint));
         assert!(text("errata.html").contains("None are known"));
-        assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));
         assert!(out.join("pictures/good/s00/input/albedo-error.png").is_file() && !out.join("pictures/no id").exists());
         let file: LeaderboardFile = json::read(&out.join(LEADERBOARD_PATH)).unwrap();
         assert_eq!((file.methods.len(), file.ranking.keys.len()), (3, 2));

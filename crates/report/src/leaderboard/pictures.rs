@@ -1,4 +1,4 @@
-//! The pictures of a site: copied from a folder, or drawn from the dataset and the submissions.
+//! The pictures of a site: copied from a folder, kept while scoring, or drawn from the dataset and the submissions.
 //!
 //! They are a set of single pictures, `<method>/<scene>/<view>/<kind>.png`, the truth's under `_truth`. A kind is any
 //! word, as in `albedo` or `rgb_true`; `<kind>-error` shows the errors of a prediction of that kind.
@@ -9,18 +9,22 @@ use std::path::{Path, PathBuf};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::{Progress, Report, SceneId, ViewId};
+use mateval_eval::error::EvalError;
 use mateval_eval::metric::PictureKind;
-use mateval_eval::open_scene::scored_views;
+use mateval_eval::scene::SeenLight;
+use mateval_eval::truth::scored_views;
 use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 use mateval_image::transfer::byte_from_unit;
-use mateval_image::{Picture, SrgbRgb, png_io};
+use mateval_image::{Mask, Picture, SrgbRgb, png_io};
 use mateval_submission::files::HashedFiles;
 use serde::Serialize;
 
 use super::entries::{LeaderboardPlan, Submissions};
 use crate::error::ReportError;
 use crate::ranking::file::{RankedMethod, Ranking};
-use crate::strips::{StripPlan, StripRow, errors, rows};
+use crate::ranking::method_id;
+use crate::strips::{StripPlan, error_map, errors, rows};
 use crate::titles::Titled;
 
 /// The folder of the truth's pictures; no id of a method begins with an underscore.
@@ -127,11 +131,11 @@ fn write(plan: &StripPlan<'_>, names: &[&str], scene: &SceneFile, progress: Prog
             let write = |method: &str, kind: &str, picture: &Picture<[u8; 3]>| -> Result<(), ReportError> {
                 let path = place(plan.out, method, &scene.id, &view.id, kind);
                 let folder = path.parent().unwrap_or(plan.out);
-                std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+                make_folder(folder)?;
                 Ok(png_io::write_rgb_bytes(&path, picture)?)
             };
             for (method, picture) in std::iter::once(&TRUTH).chain(names).zip(&row.shown) {
-                write(method, shown.kind().word(), &black_where_invalid(&row, picture))?;
+                write(method, shown.kind().word(), &black_where_invalid(&row.truth.valid, picture))?;
             }
             for (method, error) in names.iter().zip(errors(&row)) {
                 write(method, &format!("{}{ERROR}", shown.kind()), &error)?;
@@ -141,11 +145,31 @@ fn write(plan: &StripPlan<'_>, names: &[&str], scene: &SceneFile, progress: Prog
     Ok(())
 }
 
-fn black_where_invalid(row: &StripRow, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
-    Picture::from_fn(picture.width(), picture.height(), |x, y| match row.truth.valid.get(x, y) {
+fn black_where_invalid(valid: &Mask, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
+    Picture::from_fn(picture.width(), picture.height(), |x, y| match valid.get(x, y) {
         true => picture.get(x, y).0.map(byte_from_unit),
         false => [0; 3],
     })
+}
+
+/// Puts what a score compares in a view under light into a set: the truth's picture, the method's and its errors. A board that gets
+/// the set has no paths to trace again. `method` is the name in
+/// `submission.json`; names must give different ids.
+pub fn keep_seen(set: &Path, method: &str, seen: &SeenLight<'_>) -> Result<(), EvalError> {
+    let id = method_id(method);
+    let errors = error_map(&seen.prediction.map(|p| p.0), &seen.reference.map(|p| p.0), seen.valid);
+    let pictures = [
+        (TRUTH, seen.kind.to_string(), black_where_invalid(seen.valid, seen.reference)),
+        (&id, seen.kind.to_string(), black_where_invalid(seen.valid, seen.prediction)),
+        (&id, format!("{}{ERROR}", seen.kind), errors),
+    ];
+    for (id, kind, picture) in pictures {
+        let path = place(set, id, seen.scene, seen.view, &kind);
+        let folder = path.parent().unwrap_or(set);
+        make_folder(folder)?;
+        png_io::write_rgb_bytes(&path, &picture)?;
+    }
+    Ok(())
 }
 
 /// The kinds of pictures that exist, by method, scene and view.
@@ -187,7 +211,7 @@ impl PictureSet {
     pub(super) fn copy(&self, from: &Path, to: &Path) -> Result<(), ReportError> {
         for ([method, scene, view], kinds) in &self.kinds {
             let folder = Path::new(method).join(scene).join(view);
-            std::fs::create_dir_all(to.join(&folder)).map_err(FileError::io("make", &to.join(&folder)))?;
+            make_folder(&to.join(&folder))?;
             for kind in kinds {
                 let file = folder.join(format!("{kind}.png"));
                 std::fs::copy(from.join(&file), to.join(&file)).map_err(FileError::io("copy", &from.join(&file)))?;

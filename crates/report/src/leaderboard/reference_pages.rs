@@ -1,15 +1,12 @@
-//! The pages that explain the others: the protocol, the paper's own Tables II to V, and errata. The paper's numbers
-//! were measured on other renders and are never ranked with results.
+//! The pages that explain the others: about the board, the protocol, and errata.
 
 use mateval_dataset::dataset::DatasetVersion;
-use mateval_eval::metric::{Better, Metric, PictureKind};
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::key::Views;
 use minijinja::context;
 use minijinja::value::Serde;
 use pulldown_cmark::html::push_html;
 use pulldown_cmark::{Event, Parser, Tag};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
 use super::board::Board;
@@ -18,22 +15,11 @@ use super::marks::Verified;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::ranking::file::{IntervalKind, RankingRules};
-use crate::tables::{BlockWords, PAPER, TableWords};
 
-const TABLES: &str = include_str!("paper_tables.json");
-
-/// Writes `about.html`, `protocol.html`, `paper.html` and `errata.html`.
+/// Writes `about.html`, `protocol.html` and `errata.html`.
 pub(super) fn write(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     write_about(board, plan, site)?;
     write_protocol(board, site)?;
-    let paper = paper_page();
-    site.page(&Page {
-        file: "paper.html",
-        template: "paper.j2",
-        title: "The paper's numbers",
-        scripts: &["sort.js"],
-        values: context! { paper => Serde(&paper) },
-    })?;
     let errata = plan.errata.map_or(&[][..], |errata| &errata.entries);
     site.page(&Page {
         file: "errata.html",
@@ -172,112 +158,10 @@ fn leaves(value: &Value, path: String, rules: &mut Vec<(String, String)>) {
     }
 }
 
-#[derive(Deserialize)]
-struct PaperTables {
-    source: String,
-    note: String,
-    rows: Vec<PaperRow>,
-}
-
-#[derive(Deserialize)]
-struct PaperRow {
-    family: String,
-    method: String,
-    /// The maps that the method itself estimates, as `a`, `r`, `m`; null if the paper does not state them.
-    estimated: Option<Vec<String>>,
-    scores: Vec<PaperScores>,
-}
-
-/// A block of four numbers. The paper does not state the network of its LPIPS, so that they have no result keys.
-#[derive(Deserialize)]
-struct PaperScores {
-    picture: PictureKind,
-    views: Views,
-    /// In units of 1e-3, as printed.
-    mse: f64,
-    psnr: f64,
-    ssim: f64,
-    lpips: f64,
-}
-
-/// The tables as the page shows them.
-#[derive(Serialize)]
-struct PaperPage {
-    source: String,
-    note: String,
-    tables: Vec<PaperTable>,
-}
-
-#[derive(Serialize)]
-struct PaperTable {
-    title: &'static str,
-    /// The heads of a block's columns.
-    metrics: [String; 4],
-    blocks: Vec<&'static str>,
-    rows: Vec<ShownRow>,
-}
-
-#[derive(Serialize)]
-struct ShownRow {
-    family: String,
-    method: String,
-    cells: Vec<String>,
-}
-
-/// Of the tables of [`PAPER`].
-const TITLES: [&str; 4] = [
-    "Table II: RGB, fitted light",
-    "Table III: albedo, input view",
-    "Table IV: albedo, novel views",
-    "Table V: aligned albedo, unobserved regions",
-];
-
-const METRICS: [Metric; 4] = [Metric::Mse, Metric::Psnr, Metric::Ssim, Metric::LpipsAlex];
-
-fn metric_head(metric: Metric) -> String {
-    let arrow = match metric.better() {
-        Better::Lower => "↓",
-        Better::Higher => "↑",
-    };
-    format!("{} {arrow}", metric.style().title)
-}
-
-/// The tables, ready to be shown.
-fn paper_page() -> PaperPage {
-    let tables: PaperTables = serde_json::from_str(TABLES).expect("a test reads the file");
-    let table = |(title, (_, blocks)): (&'static str, TableWords)| PaperTable {
-        title,
-        metrics: METRICS.map(metric_head),
-        blocks: blocks.iter().map(|(title, ..)| *title).collect(),
-        rows: tables.rows.iter().filter_map(|row| shown(row, blocks)).collect(),
-    };
-    PaperPage { source: tables.source, note: tables.note, tables: TITLES.into_iter().zip(PAPER).map(table).collect() }
-}
-
-/// None if the paper leaves the row out of the table.
-fn shown(row: &PaperRow, blocks: &[BlockWords]) -> Option<ShownRow> {
-    let cells = |(_, picture, views): &BlockWords| -> [Option<String>; 4] {
-        let found = row.scores.iter().find(|scores| scores.picture == *picture && scores.views == *views);
-        let text = |metric: Metric, value: f64| Some(format!("{value:.*}", metric.style().digits));
-        found.map_or([const { None }; 4], |PaperScores { mse, psnr, ssim, lpips, .. }| {
-            let values = [mse, psnr, ssim, lpips];
-            std::array::from_fn(|at| text(METRICS[at], *values[at]))
-        })
-    };
-    let cells: Vec<Option<String>> = blocks.iter().flat_map(cells).collect();
-    let maps = row.estimated.as_ref().map(|maps| format!(" ({})", maps.join(", ")));
-    cells.iter().any(Option::is_some).then(|| ShownRow {
-        family: row.family.clone(),
-        method: format!("{}{}", row.method, maps.unwrap_or_default()),
-        cells: cells.into_iter().map(|cell| cell.unwrap_or_else(|| "-".to_owned())).collect(),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The first row of Table III; Table II has more rows than the others.
     #[test]
     fn a_text_about_the_board_runs_nothing_and_loads_nothing() {
         let html = |text: &str| {
@@ -306,18 +190,5 @@ mod tests {
             assert!(silent.is_empty(), "{name}: {silent:?}");
         }
         assert_eq!(meaning(schemars::schema_for!(Protocol).as_value(), "light.no_key"), None);
-    }
-
-    #[test]
-    fn the_papers_numbers() {
-        let page = paper_page();
-        let rows: Vec<usize> = page.tables.iter().map(|table| table.rows.len()).collect();
-        assert_eq!(rows, [18, 10, 10, 10]);
-        let first = &page.tables[1].rows[0];
-        assert_eq!(
-            (first.method.as_str(), first.cells[0].as_str(), first.cells[5].as_str()),
-            ("PSDR-Room", "46.911", "17.59")
-        );
-        assert!(page.tables.iter().flat_map(|table| &table.rows).all(|row| !row.cells.contains(&"-".to_owned())));
     }
 }

@@ -15,6 +15,7 @@ use mateval_eval::truth::true_material;
 use mateval_files::FileError;
 use mateval_files::untrusted::read_at_most;
 use mateval_files::whole::write_whole;
+use mateval_files::work_folder::make_folder;
 use mateval_image::png_io::jpeg_bytes;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, Texture};
@@ -88,7 +89,7 @@ fn write_room(
         let [mebibytes, most_mebibytes] = [bytes, MOST_GEOMETRY_BYTES].map(|bytes| bytes.div_ceil(1 << 20));
         return Ok(Room::TooLarge { mebibytes, most_mebibytes });
     }
-    std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+    make_folder(folder)?;
     let script = |name: &str, text: String| write_whole(&folder.join(format!("{name}.js")), text.as_bytes());
     let glb = base64::encode(read_at_most(&geometry, MOST_GEOMETRY_BYTES).map_err(io)?);
     let camera = scene.view(INPUT).map(|view| &view.camera);

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_files::FileError;
 use mateval_files::whole::write_whole;
+use mateval_files::work_folder::make_folder;
 use mateval_pages as pages;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, context};
@@ -21,7 +21,7 @@ const ASSETS: [(&str, &str); 6] = [
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 16] = [
+const TEMPLATES: [(&str, &str); 15] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
     ("board.j2", include_str!("templates/board.j2")),
@@ -30,7 +30,6 @@ const TEMPLATES: [(&str, &str); 16] = [
     ("scene.j2", include_str!("templates/scene.j2")),
     ("room.j2", include_str!("templates/room.j2")),
     ("protocol.j2", include_str!("templates/protocol.j2")),
-    ("paper.j2", include_str!("templates/paper.j2")),
     ("about.j2", include_str!("templates/about.j2")),
     ("errata.j2", include_str!("templates/errata.j2")),
     ("wide_views.j2", include_str!("templates/wide_views.j2")),
@@ -65,11 +64,10 @@ pub(super) struct PageLink {
 }
 
 /// The menu of every site.
-pub(super) const PAGES: [PageLink; 6] = [
+pub(super) const PAGES: [PageLink; 5] = [
     PageLink { file: "index.html", title: "Leaderboard" },
     PageLink { file: "scenes.html", title: "Scenes" },
     PageLink { file: "protocol.html", title: "Protocol" },
-    PageLink { file: "paper.html", title: "The paper's numbers" },
     PageLink { file: "errata.html", title: "Errata" },
     PageLink { file: "about.html", title: "About" },
 ];
@@ -131,7 +129,7 @@ impl<'a> SiteWriter<'a> {
     pub(super) fn file(&self, file: &str, text: &str) -> Result<(), ReportError> {
         let path = self.path(file);
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+            make_folder(folder)?;
         }
         Ok(write_whole(&path, text.as_bytes())?)
     }

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 
 use mateval_files::FileError;
 use mateval_files::untrusted::sha256_of_file;
+use mateval_files::work_folder::make_folder;
 use minijinja::context;
 use serde::Serialize;
 
@@ -108,7 +109,7 @@ fn unnamed(site: &SiteWriter<'_>, picture: &str) -> Result<String, ReportError> 
     let from = site.path("pictures").join(picture);
     let name = format!("{}.png", &sha256_of_file(&from)?[..32]);
     let folder = site.path(FOLDER);
-    std::fs::create_dir_all(&folder).map_err(FileError::io("make", &folder))?;
+    make_folder(&folder)?;
     std::fs::copy(&from, folder.join(&name)).map_err(FileError::io("copy", &from))?;
     Ok(name)
 }

@@ -9,7 +9,7 @@ use mateval_dataset::splitmix64;
 use super::file::{Interval, IntervalKind};
 
 /// The share of draws outside an interval on each side: 95 % lie inside.
-const TAIL: f64 = 0.025;
+pub(super) const TAIL: f64 = 0.025;
 /// Differences of means within this relative bound are rounding errors.
 const ROUNDING: f64 = 1e-12;
 

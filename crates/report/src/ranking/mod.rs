@@ -11,12 +11,14 @@ mod key_ranking;
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_dataset::SceneId;
+use mateval_dataset::ids::unused_name;
 use mateval_dataset::submission::Map;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_submission::prediction::MISSING_MAP;
 use rayon::prelude::*;
 
-use self::bootstrap::DrawTable;
+use self::bootstrap::{DrawTable, TAIL};
 pub(crate) use self::bootstrap::{Draws, tails};
 use self::file::{LEVEL, RankedMethod, Ranking, RankingRules};
 pub(crate) use self::key_ranking::kendall_tau_b;
@@ -44,18 +46,18 @@ const LEAST_HOUSES: usize = 5;
 /// scenes of others unless `partial`, which ranks each result on the scenes that it covers. Without `partial`, a scene
 /// that a submission leaves out counts as the grey that it was scored as.
 pub fn rank(results: &[ResultFile], protocol: &str, partial: bool) -> Result<Ranking, ReportError> {
-    let board = comparable(results, protocol, partial)?;
+    let entrants = comparable(results, protocol, partial)?;
     let rules = rules(results.len());
-    let houses = house_numbers(&board)?;
-    let methods = methods(&board, partial);
-    let values = values_by_key(&board, &methods, partial);
+    let houses = house_numbers(&entrants)?;
+    let methods = methods(&entrants, partial);
+    let values = values_by_key(&entrants, &methods, partial);
     let draws = DrawTable::new(rules.seed, rules.draws);
     let keys: BTreeMap<ResultKey, _> =
         values.par_iter().map(|(key, values)| (*key, rank_key(values, &houses, &rules, &draws))).collect();
     if keys.is_empty() {
         return Err(ReportError::NothingToShow { protocol: protocol.to_owned(), output: "a ranking" });
     }
-    let Board { scenes, houses, fingerprint, .. } = board;
+    let Entrants { scenes, houses, fingerprint, .. } = entrants;
     Ok(Ranking { protocol: protocol.to_owned(), fingerprint, rules, scenes, houses, methods, keys })
 }
 
@@ -64,7 +66,7 @@ fn rules(methods: usize) -> RankingRules {
     RankingRules {
         seed: SEED,
         draws: DRAWS.max(DRAWS_A_PAIR * pairs),
-        confidence: 0.95,
+        confidence: 1.0 - 2.0 * TAIL,
         level: LEVEL,
         student_below: STUDENT_BELOW,
         least_houses: LEAST_HOUSES,
@@ -72,22 +74,23 @@ fn rules(methods: usize) -> RankingRules {
 }
 
 /// For each scene, the number of its house.
-fn house_numbers(board: &Board<'_>) -> Result<Vec<usize>, ReportError> {
-    let names: Vec<&str> = board.houses.values().map(String::as_str).collect::<BTreeSet<_>>().into_iter().collect();
+fn house_numbers(entrants: &Entrants<'_>) -> Result<Vec<usize>, ReportError> {
+    let names: Vec<&str> = entrants.houses.values().map(String::as_str).collect::<BTreeSet<_>>().into_iter().collect();
     if names.len() > Draws::MOST_CLUSTERS {
         return Err(ReportError::TooManyHouses { houses: names.len(), most: Draws::MOST_CLUSTERS });
     }
-    let number = |scene: &SceneId| names.binary_search(&board.houses.get(scene)?.as_str()).ok();
-    Ok(board.scenes.iter().filter_map(number).collect())
+    let number = |scene: &SceneId| names.binary_search(&entrants.houses.get(scene)?.as_str()).ok();
+    Ok(entrants.scenes.iter().filter_map(number).collect())
 }
 
-fn methods(board: &Board<'_>, partial: bool) -> Vec<RankedMethod> {
+fn methods(entrants: &Entrants<'_>, partial: bool) -> Vec<RankedMethod> {
     let mut ids = BTreeSet::new();
     let method = |entrant: &Entrant<'_>| {
         let scored = &entrant.result.dataset.scenes;
-        let not_scored: Vec<SceneId> = board.scenes.iter().filter(|scene| !scored.contains(scene)).cloned().collect();
+        let not_scored: Vec<SceneId> =
+            entrants.scenes.iter().filter(|scene| !scored.contains(scene)).cloned().collect();
         RankedMethod {
-            id: unused_id(&shown_method(entrant.result), &mut ids),
+            id: unused_name(&method_id(&shown_method(entrant.result)), '-', &mut ids),
             method: shown_method(entrant.result),
             submission_sha256: entrant.result.submission.sha256.clone(),
             partial: partial && !(not_scored.is_empty() && entrant.left_out.is_empty()),
@@ -95,38 +98,34 @@ fn methods(board: &Board<'_>, partial: bool) -> Vec<RankedMethod> {
             left_out: entrant.left_out.iter().cloned().collect(),
         }
     };
-    board.entrants.iter().map(method).collect()
+    entrants.all.iter().map(method).collect()
 }
 
-/// An unused id: the name in lower case, with hyphens for everything that is neither an ASCII letter nor a digit.
-fn unused_id(name: &str, used: &mut BTreeSet<String>) -> String {
+/// The id of a method: its name in lower case, with hyphens for everything that is neither an ASCII letter nor a digit.
+pub(crate) fn method_id(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
     let words: Vec<&str> = plain.split('-').filter(|word| !word.is_empty()).collect();
     let short: String = words.join("-").chars().take(48).collect();
     let short = short.trim_end_matches('-');
-    let stem = if short.is_empty() { "method" } else { short };
-    let numbered = (2..).map(|number| format!("{stem}-{number}"));
-    let id = std::iter::once(stem.to_owned()).chain(numbered).find(|id| !used.contains(id)).unwrap_or_default();
-    used.insert(id.clone());
-    id
+    if short.is_empty() { "method" } else { short }.to_owned()
 }
 
 /// Every key with the values that each method has for it.
 fn values_by_key<'a>(
-    board: &Board<'_>,
+    entrants: &Entrants<'_>,
     methods: &'a [RankedMethod],
     partial: bool,
 ) -> BTreeMap<ResultKey, KeyValues<'a>> {
     let keys: BTreeSet<&ResultKey> =
-        board.entrants.iter().flat_map(|entrant| entrant.scores.scenes.values().flat_map(BTreeMap::keys)).collect();
+        entrants.all.iter().flat_map(|entrant| entrant.scores.scenes.values().flat_map(BTreeMap::keys)).collect();
     let of_key = |key: &ResultKey| {
         let column = |entrant: &Entrant<'_>| -> Vec<Option<f64>> {
             let covers = |scene: &SceneId| !(partial && entrant.left_out.contains(scene));
             let value = |scene: &SceneId| entrant.scores.scenes.get(scene)?.get(key).copied();
-            board.scenes.iter().map(|scene| value(scene).filter(|_| covers(scene))).collect()
+            entrants.scenes.iter().map(|scene| value(scene).filter(|_| covers(scene))).collect()
         };
-        let columns = methods.iter().zip(board.entrants.iter().map(column));
+        let columns = methods.iter().zip(entrants.all.iter().map(column));
         let (methods, values) = columns
             .filter(|(_, values)| values.iter().any(Option::is_some))
             .map(|(method, values)| (method.id.as_str(), values))
@@ -165,8 +164,8 @@ pub(crate) fn basis(result: &ResultFile, scores: &ProtocolResult, scenes: &[&Sce
     scores.protocol.fingerprint(&result.dataset.manifest_sha256, scenes, weights)
 }
 
-struct Board<'a> {
-    entrants: Vec<Entrant<'a>>,
+struct Entrants<'a> {
+    all: Vec<Entrant<'a>>,
     /// The scenes that any result covers, in the dataset's order.
     scenes: Vec<SceneId>,
     houses: BTreeMap<SceneId, String>,
@@ -175,7 +174,7 @@ struct Board<'a> {
 
 /// Gathers results under one protocol. Fails with every reason for which they cannot be ranked together; results that
 /// lack scenes are accepted only if `partial`.
-fn comparable<'a>(results: &'a [ResultFile], protocol: &str, partial: bool) -> Result<Board<'a>, ReportError> {
+fn comparable<'a>(results: &'a [ResultFile], protocol: &str, partial: bool) -> Result<Entrants<'a>, ReportError> {
     if results.is_empty() {
         return Err(ReportError::NoResults);
     }
@@ -193,7 +192,7 @@ fn comparable<'a>(results: &'a [ResultFile], protocol: &str, partial: bool) -> R
     ReportError::refuse(mismatches)?;
     let houses = entrants.iter().flat_map(|entrant| entrant.result.dataset.houses.clone()).collect();
     let fingerprint = entrants[0].basis(&scenes.iter().collect::<Vec<_>>());
-    Ok(Board { entrants, scenes, houses, fingerprint })
+    Ok(Entrants { all: entrants, scenes, houses, fingerprint })
 }
 
 /// What is wrong with one result by itself: it contradicts its fingerprint, or holds impossible scores or scenes.
@@ -254,7 +253,7 @@ fn left_out(result: &ResultFile, scores: &ProtocolResult) -> BTreeSet<SceneId> {
         *instances.entry(texels.scene.as_str()).or_default() += 1;
     }
     let mut missing: BTreeMap<&str, usize> = BTreeMap::new();
-    for finding in result.findings.iter().filter(|finding| finding.code == "missing_map") {
+    for finding in result.findings.iter().filter(|finding| finding.code == MISSING_MAP) {
         let mut parts = finding.file.split('/').skip(1);
         let (scene, map) = (parts.next(), parts.nth(1));
         if let Some(scene) = scene.filter(|_| map.is_some_and(|map| map.starts_with(Map::BaseColor.stem()))) {
@@ -275,7 +274,7 @@ pub(crate) mod tests {
     use mateval_eval::metric::{Metric, PictureKind};
     use mateval_eval::protocol::Protocol;
     use mateval_eval::result::key::{Region, Views};
-    use mateval_eval::result::means::means;
+    use mateval_eval::result::means;
     use mateval_eval::result::{InstanceTexelErrors, PictureValues, RESULT_FORMAT, SubmissionId, TexelErrors};
 
     use super::bootstrap::{Clusters, duels, intervals};

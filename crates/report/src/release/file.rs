@@ -8,7 +8,10 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use mateval_dataset::dataset::{DatasetFile, Secrecy, SharedLicence};
+use mateval_dataset::dataset::{DatasetFile, Secrecy, SharedLicence, Target};
+use mateval_dataset::layout::INPUT;
+use mateval_dataset::manifest::Manifest;
+use mateval_dataset::open::Dataset;
 use mateval_dataset::scene_cost::StepCost;
 use mateval_dataset::{Finding, RendererId, SceneId, Severity};
 use mateval_prep::stats::StatsFile;
@@ -18,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use super::given::{ReferenceScores, SceneVerdict};
 use super::remake::{Remake, SceneInputs};
 use super::renders::{RenderedWith, Thumbnail, ViewNoise};
-use super::table_one::Evaluated;
+use crate::error::ReportError;
 
 /// The format of this version of the file.
 pub const RELEASE_FORMAT: &str = "mateval-release/1";
@@ -63,6 +66,35 @@ pub struct ReleaseFile {
     pub without_licence: Vec<SceneId>,
     /// The scenes, in the dataset's order.
     pub scenes: Vec<ReleasedScene>,
+}
+
+/// What the release scores: the last three rows of Table I.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Evaluated {
+    /// Whether input views are scored.
+    pub original_view: bool,
+    /// Whether other views are scored.
+    pub novel_view: bool,
+    /// Whether every scored view has its true albedo.
+    pub albedo: bool,
+}
+
+impl Evaluated {
+    pub(crate) fn of(dataset: &Dataset) -> Result<Self, ReportError> {
+        let targets = &dataset.targets.targets;
+        let is_input = |target: &&Target| target.view.as_str() == INPUT;
+        let Manifest { entries, withheld, .. } = Manifest::read(&dataset.root)?;
+        let files: BTreeSet<String> = entries.into_iter().map(|entry| entry.file).chain(withheld).collect();
+        let albedo = |target: &Target| {
+            files.contains(&format!("scenes/{}/ground_truth/views/{}/albedo.exr", target.scene, target.view))
+        };
+        Ok(Self {
+            original_view: targets.iter().any(|target| is_input(&target)),
+            novel_view: !targets.iter().all(|target| is_input(&target)),
+            albedo: !targets.is_empty() && targets.iter().all(albedo),
+        })
+    }
 }
 
 /// The dataset.
@@ -215,6 +247,21 @@ impl From<Day> for String {
 }
 
 impl Day {
+    /// The day that lies this many days after 1970-01-01. Howard Hinnant, "chrono-Compatible Low-Level Date
+    /// Algorithms": years begin in March, so that a leap day is the last of its year, and an era has 400 years. Of the
+    /// years 0 to 9999.
+    pub fn since_epoch(days: i64) -> Self {
+        let days = days + 719_468;
+        let (era, of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+        let year_of_era = (of_era - of_era / 1_460 + of_era / 36_524 - of_era / 146_096) / 365;
+        let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+        let month_from_march = (5 * of_year + 2) / 153;
+        let day = of_year - (153 * month_from_march + 2) / 5 + 1;
+        let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+        let year = era * 400 + year_of_era + i64::from(month <= 2);
+        Self(format!("{year:04}-{month:02}-{day:02}"))
+    }
+
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -318,6 +365,14 @@ mod tests {
         for bad in ["", "2026", "2026-13-01", "2026-1-1", "2026-01-00", "+026-01-01", "2026-01-01-01", "<b>"] {
             assert!(bad.parse::<Day>().is_err(), "{bad}");
         }
+    }
+
+    /// Days by Python's `datetime.date.fromordinal`.
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        let of = |days| String::from(Day::since_epoch(days));
+        assert_eq!([of(0), of(59), of(11_016), of(11_017)], ["1970-01-01", "1970-03-01", "2000-02-29", "2000-03-01"]);
+        assert_eq!([of(20_784), of(47_540)], ["2026-11-27", "2100-02-28"]);
     }
 
     #[test]

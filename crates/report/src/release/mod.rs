@@ -5,8 +5,8 @@
 //! small pictures.
 //!
 //! [`CheckedRelease::new`] reads and checks everything that is given ([`given`]) before [`CheckedRelease::write`]
-//! verifies the dataset and gathers the rest: its counts beside the paper's ([`table_one`]), its pictures and their
-//! noise ([`renders`]), and what it takes to make it again ([`remake`]). [`mod@file`] holds what is written, with the
+//! verifies the dataset and gathers the rest: its counts beside the paper's, its pictures and their noise
+//! ([`renders`]), and what it takes to make it again ([`remake`]). [`mod@file`] holds what is written, with the
 //! citation; if the ground truth is withheld, it removes what was measured on it. `page` and `page_scene` fill the
 //! template.
 //!
@@ -18,7 +18,6 @@ mod page;
 mod page_scene;
 pub mod remake;
 pub mod renders;
-pub mod table_one;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,13 +31,12 @@ use mateval_files::work_folder::{WorkFolder, check_free, check_holds_none};
 use mateval_prep::recipe::RECIPE;
 use mateval_prep::{stats, verify};
 
+use file::{Evaluated, RELEASE, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, bibtex, withhold};
 pub use file::{Publication, ReleaseFile};
-use file::{RELEASE, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, bibtex, withhold};
 use given::{Bounds, SceneVerdict, read_bounds, read_comparisons};
 use page::page;
 use remake::{Remake, SceneInputs};
 use renders::{noise, rendered_with, write_thumbnail};
-use table_one::Evaluated;
 
 use crate::error::ReportError;
 use crate::publish::Published;

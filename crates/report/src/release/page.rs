@@ -4,14 +4,14 @@
 
 use mateval_dataset::{Finding, Severity};
 use mateval_pages as pages;
+use mateval_prep::stats::{Spread, StatsFile};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::file::ReleaseFile;
+use super::file::{Evaluated, ReleaseFile};
 use super::given::ReferenceScores;
 use super::page_scene::{SHOWN_SCORES, ScenePage, cpu_seconds, duration, plural, worst_psnr};
-use super::table_one::rows;
 
 const TEMPLATE: &str = include_str!("page.j2");
 
@@ -78,7 +78,7 @@ struct Failure {
 }
 
 fn headlines(file: &ReleaseFile) -> Vec<Headline> {
-    let mut all = vec![scenes(file), verified(file), compared(file), noise(file)];
+    let mut all = vec![scenes(file), verified_headline(file), compared_headline(file), noise_headline(file)];
     all.extend(SHOWN_SCORES.map(|(title, key)| {
         let mean = |scores: &Option<ReferenceScores>| {
             let value = scores.as_ref().and_then(|scores| scores.summary.get(&key));
@@ -96,7 +96,7 @@ fn headlines(file: &ReleaseFile) -> Vec<Headline> {
         };
         plain(value, format!("floor to ceiling: {}, PSNR in dB", title.to_lowercase()))
     }));
-    all.push(cost(file));
+    all.push(cost_headline(file));
     all
 }
 
@@ -110,7 +110,7 @@ fn scenes(file: &ReleaseFile) -> Headline {
     plain(file.stats.scenes.to_string(), label)
 }
 
-fn verified(file: &ReleaseFile) -> Headline {
+fn verified_headline(file: &ReleaseFile) -> Headline {
     let errors = file.verification.findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     let value = if errors == 0 { "sound".to_owned() } else { format!("{errors} error{}", plural(errors)) };
     Headline { value, label: "prep verify".to_owned(), is_bad: errors > 0 }
@@ -121,7 +121,7 @@ fn comparable(file: &ReleaseFile) -> usize {
     file.scenes.iter().filter(|scene| !scene.photo).count()
 }
 
-fn compared(file: &ReleaseFile) -> Headline {
+fn compared_headline(file: &ReleaseFile) -> Headline {
     let (all, given) = (comparable(file), file.comparisons().count());
     let agree = file.comparisons().filter(|verdict| verdict.agrees).count();
     match given {
@@ -136,7 +136,7 @@ fn compared(file: &ReleaseFile) -> Headline {
     }
 }
 
-fn noise(file: &ReleaseFile) -> Headline {
+fn noise_headline(file: &ReleaseFile) -> Headline {
     let mut worst: Vec<f64> = file.scenes.iter().filter_map(worst_psnr).collect();
     worst.sort_by(f64::total_cmp);
     let value = match worst[..] {
@@ -147,7 +147,7 @@ fn noise(file: &ReleaseFile) -> Headline {
     plain(value, "noise of the photo's renderer: PSNR of a scene's noisiest view, median of the scenes".to_owned())
 }
 
-fn cost(file: &ReleaseFile) -> Headline {
+fn cost_headline(file: &ReleaseFile) -> Headline {
     let known: Vec<f64> = file.scenes.iter().filter_map(|scene| cpu_seconds(&scene.costs)).collect();
     let all = file.scenes.len();
     match known.len() {
@@ -226,6 +226,33 @@ fn without_bound(name: &str, method: &str, scores: Option<&ReferenceScores>, all
     }
 }
 
+/// A row of Table I: the three columns of the paper (MatEval, PSDR-Room, PhotoScene), and the release.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+struct Row {
+    title: &'static str,
+    paper: [&'static str; 3],
+    ours: String,
+}
+
+const YES: &str = "✓";
+const NO: &str = "✗";
+
+/// The rows of Table I, the release's numbers rounded as the paper's.
+fn rows(stats: &StatsFile, evaluated: Evaluated) -> Vec<Row> {
+    let row = |title, paper, ours| Row { title, paper, ours };
+    let mean =
+        |spread: Option<Spread>| spread.map_or_else(|| "unknown".to_owned(), |spread| format!("{:.1}", spread.mean));
+    let mark = |is_scored: bool| if is_scored { YES } else { NO }.to_owned();
+    vec![
+        row("Number of scenes", ["184", "7", "70"], stats.scenes.to_string()),
+        row("Avg. objects / scene", ["13.2", "not stated", "9.4"], mean(stats.objects_per_scene)),
+        row("Avg. categories / scene", ["4.3", "not stated", "4.1"], mean(stats.super_categories_per_scene)),
+        row("Original view eval.", [YES, YES, YES], mark(evaluated.original_view)),
+        row("Novel view eval.", [YES, NO, NO], mark(evaluated.novel_view)),
+        row("Albedo eval.", [YES, NO, NO], mark(evaluated.albedo)),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -235,7 +262,7 @@ mod tests {
     use mateval_dataset::{SceneId, SourceKind, ViewId};
     use mateval_eval::result::key::ResultKey;
     use mateval_prep::compare::file::State;
-    use mateval_prep::stats::{Counts, STATS_FORMAT, SceneStats, Spread, StatsFile};
+    use mateval_prep::stats::{Counts, STATS_FORMAT, SceneStats};
 
     use super::super::file::{
         NOT_SHOWN, Publication, RELEASE_FORMAT, ReleasedDataset, ReleasedScene, Verification, withhold,
@@ -243,7 +270,6 @@ mod tests {
     use super::super::given::{SceneVerdict, StateCount};
     use super::super::remake::{Remake, SceneInputs};
     use super::super::renders::ViewNoise;
-    use super::super::table_one::Evaluated;
 
     use super::*;
 

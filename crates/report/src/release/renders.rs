@@ -8,8 +8,8 @@ use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::render_file::{RENDER_FILE, RenderDevice, RenderFile};
 use mateval_dataset::{RendererId, SceneId, ViewId, json};
-use mateval_files::FileError;
 use mateval_files::whole::write_whole;
+use mateval_files::work_folder::make_folder;
 use mateval_image::png_io::jpeg_bytes;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
@@ -161,7 +161,7 @@ pub(crate) fn write_thumbnail(
     let file = format!("{PICTURES}/{}.jpg", scene.id);
     let place = out.join(&file);
     let folder = place.parent().unwrap_or(out);
-    std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+    make_folder(folder)?;
     write_whole(&place, &jpeg)?;
     Ok(Some(Thumbnail { file, width: small.width(), height: small.height() }))
 }

@@ -4,9 +4,9 @@ use mateval_eval::metric::PictureKind::{
     Albedo, AlbedoAligned, Metallic, RgbFitted, RgbRelit, RgbTrue, Roughness, TextureBaseColor,
 };
 use mateval_eval::metric::{Better, Metric, NumberStyle, PictureKind};
-use mateval_eval::result::constancy::{Constancy, Deviation};
 use mateval_eval::result::key::Views::{Input, Novel, Observed, Unobserved, Wide, WideUnobserved};
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
+use mateval_eval::result::{Constancy, Deviation};
 
 use crate::titles::Titled;
 
@@ -194,13 +194,13 @@ pub(super) struct Layout {
 const POOLED: [Quantity; 3] = [Quantity::Pixels, Quantity::Score(Metric::Mse), Quantity::Score(Metric::Psnr)];
 
 /// A block's title, kind of picture and views.
-pub(crate) type BlockWords = (&'static str, PictureKind, Views);
+type BlockWords = (&'static str, PictureKind, Views);
 
 /// A table's title, and its blocks.
-pub(crate) type TableWords = (&'static str, &'static [BlockWords]);
+type TableWords = (&'static str, &'static [BlockWords]);
 
 /// The paper's Tables II to V in its order.
-pub(crate) const PAPER: [TableWords; 4] = [
+const PAPER: [TableWords; 4] = [
     ("RGB, fitted light", &[("Input view", RgbFitted, Input), ("Novel views", RgbFitted, Novel)]),
     ("Albedo, input view", &[("Albedo", Albedo, Input), ("Aligned albedo", AlbedoAligned, Input)]),
     ("Albedo, novel views", &[("Albedo", Albedo, Novel), ("Aligned albedo", AlbedoAligned, Novel)]),

@@ -12,7 +12,7 @@ mod tests;
 
 pub(crate) use formats::quoted;
 pub use layouts::Grouping;
-pub(crate) use layouts::{BlockWords, CellKey, ConstancyMeans, PAPER, TableWords, Value};
+pub(crate) use layouts::{CellKey, ConstancyMeans, Value};
 pub(crate) use table::pooled;
 
 use crate::error::{Mismatch, ReportError};

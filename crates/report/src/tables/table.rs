@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mateval_dataset::{SceneId, SourceKind};
 use mateval_eval::metric::{Better, Metric, PictureKind};
-use mateval_eval::result::constancy::Constancy;
+use mateval_eval::result::Constancy;
 use mateval_eval::result::key::{PictureName, ResultKey, Views};
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
 use mateval_metrics::Psnr;
@@ -64,7 +64,7 @@ pub(super) fn groups(
         // The paper's tables hold rooms of 3D-FRONT alone.
         Grouping::Dataset if protocol == "paper" && sources(results).len() > 1 => sources(results)
             .into_iter()
-            .map(|(kind, scenes)| group(source_title(kind), &|_, scores| of_scenes(scores, &scenes)))
+            .map(|(kind, scenes)| group(kind.title(), &|_, scores| of_scenes(scores, &scenes)))
             .collect(),
         Grouping::Dataset => vec![group("", &|_, scores| of_dataset(scores))],
         Grouping::Scene => {
@@ -92,16 +92,6 @@ fn sources(results: &[ResultFile]) -> BTreeMap<SourceKind, Vec<SceneId>> {
         }
     }
     kinds
-}
-
-fn source_title(kind: SourceKind) -> &'static str {
-    match kind {
-        SourceKind::Front3d => "3D-FRONT",
-        SourceKind::Bitterli => "Bitterli",
-        SourceKind::Gltf => "glTF",
-        SourceKind::Blend => "Blender",
-        SourceKind::Capture => "Captures",
-    }
 }
 
 /// Means over some of the scenes; the noise of different scenes is independent.

@@ -18,7 +18,6 @@ use super::color::{CIE_Y_INTEGRAL, ColorUse, black_body, rec709_from_xyz};
 use super::document::Element;
 use super::reader::{COLORS, Parameters, Reader, rotation, vector};
 use crate::primitives::{MapDisc, ROWS, texel_direction};
-use crate::uv::mean_color;
 
 /// The mean angular diameter of the sun in degrees, seen from the Earth.
 const SUN_DIAMETER_DEG: f64 = 0.5358;
@@ -116,7 +115,7 @@ impl<'a> Reader<'a> {
     }
 
     fn mean_of(&self, texture: TextureIndex) -> [f32; 3] {
-        mean_color(&self.scene.textures[texture.0].texture).map(|v| v as f32)
+        self.scene.textures[texture.0].texture.mean().map(|v| v as f32)
     }
 
     /// The radiance of a constant environment.

@@ -11,6 +11,7 @@ use mateval_dataset::material::{Material, MaterialModel};
 use mateval_dataset::reference::{Emission, LightGroup, SourceTexture, SurfaceIndex};
 use mateval_dataset::{DatasetError, Finding, Role, SceneLights, Severity, json};
 use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
 use serde::{Deserialize, Serialize};
@@ -148,7 +149,7 @@ pub fn bake(
     // Blender has another working folder.
     let absolute = |path: &Path| std::path::absolute(path).map_err(FileError::io("resolve", path));
     let (blend, out) = (absolute(blend)?, absolute(out)?);
-    std::fs::create_dir_all(&out).map_err(FileError::io("make", &out))?;
+    make_folder(&out)?;
     let script = write_scripts(&out)?.with_file_name(BAKE_SCRIPT);
     let file = blend.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let job = Job {

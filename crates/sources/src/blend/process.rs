@@ -9,6 +9,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 
 /// Time between two looks at the running process.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
@@ -231,7 +232,7 @@ const PACKAGE: &str = "mateval";
 pub fn write_scripts(folder: &Path) -> Result<PathBuf, FileError> {
     let scripts = folder.join("scripts");
     let package = scripts.join(PACKAGE);
-    std::fs::create_dir_all(&package).map_err(FileError::io("make", package))?;
+    make_folder(&package)?;
     for (name, text) in SCRIPTS {
         let path = scripts.join(name);
         std::fs::write(&path, text).map_err(FileError::io("write", path))?;

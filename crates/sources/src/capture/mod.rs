@@ -14,10 +14,11 @@ pub mod measured;
 mod ply;
 
 use std::collections::{BTreeMap, HashMap};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel, StatedParameters};
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::obj::{self, Materials, ObjLimits};
 use mateval_dataset::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface};
 use mateval_dataset::{Role, SceneLights, TriangleMesh};
@@ -44,7 +45,7 @@ const LEAST_PIECE: f64 = 0.005;
 const REST: &str = "rest";
 /// Longest sides of a room, in metres: others are those of a mesh in another unit.
 const SIDES_M: std::ops::RangeInclusive<f64> = 0.2..=200.0;
-/// The reflectance of all surfaces, which no score sees: only light in pictures of other kinds depends on it.
+/// Reflectance of all surfaces. No score depends on it; some rendered pictures do.
 const PLACEHOLDER: [f32; 3] = [0.5; 3];
 /// Endings of the files in the folder of photos that count as photos, in lower case. Those of formats that are not read
 /// count too, since cameras may be numbered as they are.
@@ -169,7 +170,7 @@ pub fn read(files: &CaptureFiles) -> Result<Capture, SourceError> {
 }
 
 /// The names of the photos in a folder, in order.
-fn photos_of(folder: &std::path::Path) -> Vec<String> {
+fn photos_of(folder: &Path) -> Vec<String> {
     let names = std::fs::read_dir(folder).into_iter().flatten().flatten().take(MOST_PHOTOS);
     let names = names.filter_map(|entry| entry.file_name().into_string().ok());
     let is_photo = |name: &String| {
@@ -204,55 +205,59 @@ fn photo_path(folder: &SourceFolder, photos: &str, names: &[String], photo: &Pho
 fn read_mesh(folder: &mut SourceFolder, path: &str, files: &CaptureFiles, log: &mut Log) -> Result<Scan, SourceError> {
     let place = files.root.join(path);
     let in_mesh = |fault: Invalid| fault.in_file(&place);
+    let read = |folder: &mut SourceFolder| folder.read(path).map_err(|fault| in_mesh(Invalid(fault.message)));
     let ending = path.rsplit_once('.').map(|(_, ending)| ending.to_lowercase());
     match ending.as_deref() {
-        Some("ply") => {
-            let bytes = folder.read(path).map_err(|fault| in_mesh(Invalid(fault.message)))?;
-            let mesh = ply::read(&bytes, MOST_TRIANGLES).map_err(in_mesh)?;
-            if mesh.without_area > 0 {
-                let message = format!("{} faces have fewer than three corners", mesh.without_area);
-                log.note("degenerate_triangles", "", message, "left them out");
-            }
-            let positions = mesh.positions.into_iter().map(DVec3::from_array).collect();
-            let labels = mesh.labels;
-            let (instances, names) = match labels.is_empty() {
-                true => (vec![0; mesh.triangles.len()], vec!["mesh".to_owned()]),
-                false => by_label(&labels),
-            };
-            Ok(Scan { positions, triangles: mesh.triangles, instances, names })
-        }
-        Some("obj") => {
-            let bytes = folder.read(path).map_err(|fault| in_mesh(Invalid(fault.message)))?;
-            let limits = ObjLimits { triangles: MOST_TRIANGLES, corners: 3 * MOST_TRIANGLES };
-            let read = obj::read(&bytes, limits, Materials::Ignored);
-            let read = read.map_err(|error| in_mesh(Invalid(error.to_string())))?;
-            let positions = read.mesh.positions.iter().map(|position| position.as_dvec3() + read.base).collect();
-            let groups = read.groups.iter().enumerate();
-            let instances = groups.flat_map(|(at, group)| std::iter::repeat_n(at, group.triangles)).collect();
-            let names = read.groups.iter().map(|group| group.name.clone()).collect();
-            Ok(Scan { positions, triangles: read.mesh.triangles, instances, names })
-        }
-        Some("glb" | "gltf") => {
-            let read = gltf::read(&place, Some(DVec3::ZERO), &gltf::Limits::default())?;
-            // Its buffers are read again for their hashes, which the scene records.
-            for (file, _) in &read.files.hashes {
-                let inside = place.parent().unwrap_or(&files.root).join(file);
-                let inside = inside.strip_prefix(&files.root).unwrap_or(&inside).to_string_lossy().into_owned();
-                folder.read(&inside).map_err(|fault| in_mesh(Invalid(fault.message)))?;
-            }
-            let mut scan =
-                Scan { positions: Vec::new(), triangles: Vec::new(), instances: Vec::new(), names: Vec::new() };
-            for (at, surface) in read.scene.surfaces.iter().enumerate() {
-                let first = scan.positions.len() as u32;
-                scan.positions.extend(surface.mesh.positions.iter().map(|position| position.as_dvec3()));
-                scan.triangles.extend(surface.mesh.triangles.iter().map(|corners| corners.map(|at| at + first)));
-                scan.instances.extend(std::iter::repeat_n(at, surface.mesh.triangles.len()));
-                scan.names.push(surface.name.clone());
-            }
-            Ok(scan)
-        }
+        Some("ply") => scan_of_ply(&read(folder)?, log).map_err(in_mesh),
+        Some("obj") => scan_of_obj(&read(folder)?).map_err(in_mesh),
+        Some("glb" | "gltf") => scan_of_gltf(folder, &place, &files.root),
         _ => Err(in_mesh(Invalid("expected a mesh as .ply, .obj, .glb or .gltf".to_owned()))),
     }
+}
+
+fn scan_of_ply(bytes: &[u8], log: &mut Log) -> Result<Scan, Invalid> {
+    let mesh = ply::read(bytes, MOST_TRIANGLES)?;
+    if mesh.without_area > 0 {
+        let message = format!("{} faces have fewer than three corners", mesh.without_area);
+        log.note("degenerate_triangles", "", message, "left them out");
+    }
+    let positions = mesh.positions.into_iter().map(DVec3::from_array).collect();
+    let labels = mesh.labels;
+    let (instances, names) = match labels.is_empty() {
+        true => (vec![0; mesh.triangles.len()], vec!["mesh".to_owned()]),
+        false => by_label(&labels),
+    };
+    Ok(Scan { positions, triangles: mesh.triangles, instances, names })
+}
+
+fn scan_of_obj(bytes: &[u8]) -> Result<Scan, Invalid> {
+    let limits = ObjLimits { triangles: MOST_TRIANGLES, corners: 3 * MOST_TRIANGLES };
+    let read = obj::read(bytes, limits, Materials::Ignored).map_err(|error| Invalid(error.to_string()))?;
+    let positions = read.mesh.positions.iter().map(|position| position.as_dvec3() + read.base).collect();
+    let groups = read.groups.iter().enumerate();
+    let instances = groups.flat_map(|(at, group)| std::iter::repeat_n(at, group.triangles)).collect();
+    let names = read.groups.iter().map(|group| group.name.clone()).collect();
+    Ok(Scan { positions, triangles: read.mesh.triangles, instances, names })
+}
+
+/// `place` is the file, below the capture's folder `root`.
+fn scan_of_gltf(folder: &mut SourceFolder, place: &Path, root: &Path) -> Result<Scan, SourceError> {
+    let read = gltf::read(place, Some(DVec3::ZERO), &gltf::Limits::default())?;
+    // Its buffers are read again for their hashes, which the scene records.
+    for (file, _) in &read.files.hashes {
+        let inside = place.parent().unwrap_or(root).join(file);
+        let inside = inside.strip_prefix(root).unwrap_or(&inside).to_string_lossy().into_owned();
+        folder.read(&inside).map_err(|fault| Invalid(fault.message).in_file(place))?;
+    }
+    let mut scan = Scan { positions: Vec::new(), triangles: Vec::new(), instances: Vec::new(), names: Vec::new() };
+    for (at, surface) in read.scene.surfaces.iter().enumerate() {
+        let first = scan.positions.len() as u32;
+        scan.positions.extend(surface.mesh.positions.iter().map(|position| position.as_dvec3()));
+        scan.triangles.extend(surface.mesh.triangles.iter().map(|corners| corners.map(|at| at + first)));
+        scan.instances.extend(std::iter::repeat_n(at, surface.mesh.triangles.len()));
+        scan.names.push(surface.name.clone());
+    }
+    Ok(scan)
 }
 
 /// Numbers and names of the instances of labels, in the order of the labels.
@@ -331,9 +336,9 @@ fn scene_of(scan: &Scan, place: impl Fn(DVec3) -> Vec3, log: &mut Log) -> Refere
 
 /// Reports a mesh that is no room in metres.
 fn check_sides(scene: &ReferenceScene, log: &mut Log) {
-    let corners = || scene.surfaces.iter().flat_map(|surface| &surface.mesh.positions);
-    let bounds = |of: fn(Vec3, Vec3) -> Vec3| corners().copied().reduce(of).unwrap_or_default();
-    let longest = f64::from((bounds(Vec3::max) - bounds(Vec3::min)).max_element());
+    let corners = scene.surfaces.iter().flat_map(|surface| &surface.mesh.positions).copied();
+    let [low, high] = bounds(corners).unwrap_or_default();
+    let longest = f64::from((high - low).max_element());
     if !SIDES_M.contains(&longest) {
         let (least, most) = SIDES_M.into_inner();
         let message = format!("its longest side is {longest:.3} m, expected {least} to {most} m for a room");

@@ -80,12 +80,9 @@ impl<'a> RoomSampler<'a> {
     /// A sampler of room number `room`; `world` was made of `house.scene`. Fails where the room has no floor.
     pub fn new(house: &'a FurnishedHouse, world: &'a World, room: usize) -> Result<Self, CameraError> {
         let floors = (0..house.placed.len()).filter(|&surface| is_floor(house, surface, room));
-        let positions =
-            || floors.clone().flat_map(|surface| house.scene.surfaces[surface].mesh.positions.iter().copied());
-        let (Some(low), Some(high)) = (positions().reduce(Vec3::min), positions().reduce(Vec3::max)) else {
-            return Err(CameraError::NoFloor { room: house.house.rooms[room].id.clone() });
-        };
-        Ok(Self { house, world, room, floor: [low, high] })
+        let positions = floors.flat_map(|surface| house.scene.surfaces[surface].mesh.positions.iter().copied());
+        let no_floor = || CameraError::NoFloor { room: house.house.rooms[room].id.clone() };
+        Ok(Self { house, world, room, floor: mesh::bounds(positions).ok_or_else(no_floor)? })
     }
 
     /// The area of the room's floor, in square metres.

@@ -11,12 +11,12 @@ use mateval_dataset::material::StatedParameters;
 use mateval_dataset::reference::{ReferenceScene, Surface};
 use mateval_dataset::{Finding, Role, Severity, TriangleMesh};
 use mateval_files::FileError;
-use mateval_files::source_folder::{LookedFor, SourceFolder};
+use mateval_files::source_folder::{LookedFor, SourceFolder, slashed};
 use mateval_files::untrusted::shortened;
 
 use super::appearance::{Appearances, MISSING};
 use super::document::Limits;
-use super::house::{Child, ChildKind, DesignerCamera, House, shown_path, world_from_house};
+use super::house::{Child, ChildKind, DesignerCamera, House};
 use super::material_class::{AppearanceRule, Finish, class_of_architecture, class_of_model};
 use super::model::{Kind, Library, Model, ModelInfo, is_folder_name};
 use super::{document, house, model};
@@ -98,7 +98,7 @@ pub struct HouseFiles {
 pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, SourceError> {
     // The JSON.
     let path = files.root.join(&files.house);
-    let file = shown_path(&files.house);
+    let file = slashed(&files.house);
     let mut log = Log::new(file.clone(), limits.findings);
     let (house, house_folder) = read_json(&path, limits, &mut log)?;
 
@@ -121,7 +121,8 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     };
     let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.add_room(room)).collect();
 
-    // Findings and repairs that concern all rooms.
+    // Findings and repairs that concern all rooms: faces without uv become surfaces of their own (`uv`), and sheets that
+    // coincide move apart by 0.1 mm a layer (`coincident`). Nothing later moves a vertex.
     furnisher.report_private_pieces();
     let Furnisher { mut log, appearances, surfaces, mut placed, models, textures: texture_library, .. } = furnisher;
     appearances.report_untextured(&mut log);
@@ -157,7 +158,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
 
 /// Reads a house's JSON and nothing else. Returns its findings too.
 pub fn read_house(path: &Path, limits: &Limits) -> Result<(House, Vec<Finding>), SourceError> {
-    let mut log = Log::new(shown_path(path), limits.findings);
+    let mut log = Log::new(slashed(path), limits.findings);
     let (house, _) = read_json(path, limits, &mut log)?;
     Ok((house, log.into_findings()))
 }
@@ -173,7 +174,7 @@ fn read_json(path: &Path, limits: &Limits, log: &mut Log) -> Result<(House, Sour
 fn library(files: &HouseFiles, path: &Path, limits: &Limits) -> Result<Library, SourceError> {
     let at = files.root.join(path);
     let folder = SourceFolder::new(&at, limits.file_bytes).map_err(FileError::io("read", &at))?;
-    Ok(Library { folder, name: shown_path(path) })
+    Ok(Library { folder, name: slashed(path) })
 }
 
 /// A piece with a smaller scale is left out. (ATISS drops rooms with such pieces.)
@@ -388,6 +389,12 @@ impl Furnisher<'_> {
             self.log.note("not_public", "/furniture", message, "left them out");
         }
     }
+}
+
+/// From the house's space to world space: the identity, or with `compat` the mirror that BlenderProc applies, since it
+/// swaps y and z instead of rotating.
+fn world_from_house(compat: bool) -> DMat4 {
+    DMat4::from_scale(DVec3::new(1.0, 1.0, if compat { -1.0 } else { 1.0 }))
 }
 
 /// Whether the placement is a scale and then a motion that keeps lengths and does not mirror.

@@ -8,6 +8,7 @@ use std::path::Path;
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use mateval_dataset::material::UvTransform;
 use mateval_dataset::{Severity, TriangleMesh};
+use mateval_files::source_folder::slashed;
 use mateval_files::untrusted::shortened;
 use serde_json::Value;
 
@@ -135,12 +136,6 @@ impl Placement {
         let mirror = DMat4::from_mat3(DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)));
         DMat4::from_rotation_translation(self.rotation, self.position) * mirror * DMat4::from_scale(self.scale)
     }
-}
-
-/// From the house's space to world space: the identity, or with `compat` the mirror that BlenderProc applies, since it
-/// swaps y and z instead of rotating.
-pub(super) fn world_from_house(compat: bool) -> DMat4 {
-    DMat4::from_scale(DVec3::new(1.0, 1.0, if compat { -1.0 } else { 1.0 }))
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -530,15 +525,10 @@ pub(super) fn designer_cameras(
     if all.is_empty() {
         let message = format!("expected cameras of the house '{}', found none", house.uid);
         let action = "used the cameras in the house's JSON";
-        log.push(Severity::Note, "no_camera", &shown_path(beside), "", message, action);
+        log.push(Severity::Note, "no_camera", &slashed(beside), "", message, action);
     }
-    let hash = folder.into_files().hashes.into_iter().next().map(|(_, hash)| (shown_path(beside), hash));
+    let hash = folder.into_files().hashes.into_iter().next().map(|(_, hash)| (slashed(beside), hash));
     Ok((if all.is_empty() { house.cameras.clone() } else { all }, hash))
-}
-
-/// A path with forward slashes, as findings and lists of files give it.
-pub(super) fn shown_path(path: &Path) -> String {
-    path.to_string_lossy().replace('\\', "/")
 }
 
 /// The cameras of the entries `<uid>_<number>.jpg`, sorted by number.

@@ -202,6 +202,7 @@ fn shift(mesh: &mut TriangleMesh, blocks: &[usize], step: f32) {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use mateval_testkit::scenes::quad;
 
     use super::*;
 
@@ -282,12 +283,7 @@ mod tests {
 
     /// Two triangles that share an edge.
     fn square(uvs: Option<Vec<Vec2>>) -> TriangleMesh {
-        TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y],
-            normals: Some(vec![Vec3::Z; 4]),
-            uvs,
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        }
+        TriangleMesh { normals: Some(vec![Vec3::Z; 4]), uvs, ..quad(Vec3::ZERO, Vec3::X, Vec3::Y) }
     }
 
     fn corner_uvs() -> Vec<Vec2> {

@@ -7,11 +7,12 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use mateval_dataset::dataset::SUPER_CATEGORIES;
 use mateval_dataset::material::MaterialClass;
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::obj::{self, Materials, ObjFault, ObjLimits, ObjMesh};
 use mateval_dataset::{Severity, TriangleMesh};
 use mateval_files::source_folder::{LookedFor, SourceFolder};
 use mateval_files::untrusted::shortened;
-use mateval_image::texture_io::read_texture_and_alpha;
+use mateval_image::texture_io::{Encoding, read_with_alpha};
 use mateval_image::{Texture, Wrap};
 use serde_json::Value;
 
@@ -158,7 +159,8 @@ fn without_painted_shadow(
         return (mesh, groups);
     }
     // A texture that cannot be read is reported when the material is made.
-    let read = library.folder.path(texture).ok().and_then(|path| read_texture_and_alpha(&path, Wrap::Repeat).ok());
+    let path = library.folder.path(texture).ok();
+    let read = path.and_then(|path| read_with_alpha(&path, Encoding::Linear, Wrap::Repeat).ok());
     let Some((texels, Some(opacity))) = read else { return (mesh, groups) };
     let shadow = drop_shadow(&mesh, &texels, &opacity);
     if shadow.is_empty() {
@@ -215,10 +217,8 @@ fn in_metres(
 
 /// The longest side of the bounding box of all triangles, in the file's unit.
 fn longest_side(mesh: &TriangleMesh) -> f32 {
-    let corners = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]).filter(|p| p.is_finite());
-    let low = corners().reduce(Vec3::min).unwrap_or_default();
-    let high = corners().reduce(Vec3::max).unwrap_or_default();
-    (high - low).max_element()
+    let corners = mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]).filter(|p| p.is_finite());
+    bounds(corners).map_or(0.0, |[low, high]| (high - low).max_element())
 }
 
 /// The largest height above the model's lowest point, in metres. Models stand on y = 0 to within 4 mm, and their

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec3, Vec3};
 use mateval_dataset::reference::Surface;
-use mateval_dataset::{Role, Severity, TriangleMesh};
+use mateval_dataset::{Role, Severity, TriangleMesh, mesh};
 use serde_json::{Value, json};
 
 use super::house::{Child, ChildKind, Placement};
@@ -131,8 +131,7 @@ fn is_kind(placed: &PlacedSurface, kind: &str) -> bool {
 
 /// The box around a mesh's triangles.
 fn bounds(mesh: &TriangleMesh) -> [Vec3; 2] {
-    let corners = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]);
-    [corners().reduce(Vec3::min).unwrap(), corners().reduce(Vec3::max).unwrap()]
+    mesh::bounds(mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize])).unwrap()
 }
 
 fn size(mesh: &TriangleMesh) -> Vec3 {

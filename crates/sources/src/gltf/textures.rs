@@ -15,7 +15,6 @@ use mateval_image::{ImageError, Texels, Texture, Wrap};
 use super::document::read_uri;
 use super::reader::{Aspect, Omission, Reader};
 use crate::source_scene::{other_range, picture_fault, report_turned};
-use crate::uv::mean_color;
 
 #[derive(Clone)]
 pub(super) struct Lookup<'a> {
@@ -126,7 +125,7 @@ impl Reader<'_> {
             Encoding::Linear => Aspect::Values,
         };
         let texture = self.texture(&lookup.texture, aspect);
-        texture.map_or([MISSING; 3], |at| mean_color(&self.scene.textures[at.0].texture).map(|value| value as f32))
+        texture.map_or([MISSING; 3], |at| self.scene.textures[at.0].texture.mean().map(|value| value as f32))
     }
 
     /// Reads a texture, unless it has been read before. A fault of its image is reported once.

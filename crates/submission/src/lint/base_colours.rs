@@ -101,7 +101,7 @@ pub(super) fn mostly_wrong(scenes: Vec<Decoding>) -> Vec<Finding> {
 }
 
 /// A finding where red and blue are exchanged.
-pub(super) fn exchanged(place: &str, looks: &[Look]) -> Option<Finding> {
+pub(super) fn swapped_red_blue(place: &str, looks: &[Look]) -> Option<Finding> {
     let hues = hue(looks, 2, |value| value);
     let [base, photo] = hues.deviations();
     let correlation = hues.correlation();

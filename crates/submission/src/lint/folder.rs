@@ -14,6 +14,7 @@ use mateval_files::untrusted::{distance, nearest, plain, shortened};
 use crate::archive::MAX_ENTRIES;
 use crate::error::{SubmissionError, error, note, warning};
 use crate::map_file::default_value;
+use crate::prediction::MISSING_MAP;
 
 /// How deep maps lie: `scenes/<scene>/<instance>/<map>`.
 const DEPTH: usize = 4;
@@ -290,7 +291,7 @@ fn check_object(tree: &Tree, folder: &str, findings: &mut Vec<Finding>) {
             0 if meant.contains(&map) => {}
             0 if map == Map::BaseColor => {
                 let message = "expected a PNG or an EXR, found none";
-                findings.push(error("missing_map", &place, message, "write it; a missing one scores as linear 0.5"));
+                findings.push(error(MISSING_MAP, &place, message, "write it; a missing one scores as linear 0.5"));
             }
             0 => {
                 // Each map has a code of its own, since the findings of one code become one line.

@@ -1,5 +1,5 @@
-//! Maps that can be read but look wrong: header fields that are ignored or that no such map should have, and numbers that
-//! are far smaller than those of any material.
+//! Maps that can be read but look wrong: header fields that are ignored or that no such map should have, and numbers
+//! that are far smaller than those of any material.
 
 use mateval_dataset::Finding;
 use mateval_dataset::submission::Map;
@@ -137,8 +137,8 @@ fn beyond_unit(texture: &Texture) -> Vec<Remark> {
     beyond.map(remark).into_iter().collect()
 }
 
-/// A scene whose stored numbers are smaller, and not all 0, was written in another range: 0 and 1 as bytes in place of 0
-/// and 255, or floats that were divided once too often. No room has colours or a roughness below it throughout.
+/// A scene whose stored numbers are smaller, and not all 0, was written in another range: 0 and 1 as bytes in place of
+/// 0 and 255, or floats that were divided once too often. No room has colours or a roughness below it throughout.
 const LEAST_LARGEST: f32 = 1.5 / 255.0;
 
 /// The largest number of a map as its file stores it.
@@ -175,8 +175,8 @@ impl Largest {
     }
 }
 
-/// A finding where even the largest number of all maps of one kind in a scene is that of another range. Single maps prove
-/// nothing: a screen is black, and a network's metallic of a wall is noise.
+/// A finding where even the largest number of all maps of one kind in a scene is that of another range. Single maps
+/// prove nothing: a screen is black, and a network's metallic of a wall is noise.
 pub(super) fn small_numbers(place: &str, map: Map, all: &[Largest]) -> Option<Finding> {
     let largest = all.iter().map(|one| one.unit()).reduce(f32::max)?;
     let words: Option<Vec<u16>> =

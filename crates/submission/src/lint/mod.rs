@@ -10,8 +10,8 @@
 //! An error is something that scoring refuses or replaces by a default. A warning is scored, but probably a mistake. A
 //! note is for information. Evidence from pictures is never an error; the message states it.
 //!
-//! A new finding belongs into the file of its concept, with a row in format/submission.md and one in the table of planted faults
-//! (`tests/suite/lint.rs`). A new concept is also called in `scene`.
+//! A new finding belongs into the file of its concept, with a row in format/submission.md and one in the table of
+//! planted faults (`tests/suite/lint.rs`). A new concept is also called in `scene`.
 
 mod base_colours;
 mod folder;

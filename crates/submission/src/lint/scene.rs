@@ -19,7 +19,7 @@ use super::map_headers::{self, Largest};
 use super::sight::{CoarseTexel, InstanceSight, Look, Pairs, ScalarLook, Sight, looks, scalar_looks};
 use crate::atlas::AtlasMeshes;
 use crate::error::{SubmissionError, error, note, warning};
-use crate::files::{MAX_MAP_BYTES, MapFolder, SubmittedFile, relative};
+use crate::files::{MapFolder, relative};
 use crate::map_file::{self, MapFile, MapHeader};
 use crate::prediction::{MAX_SCENE_BYTES, MemoryBudget, compact_texture};
 
@@ -89,12 +89,12 @@ pub(super) fn check(dataset: &Dataset, submission: &Path, scene: &SceneFile) -> 
     let files: Vec<&(String, bool)> = all.iter().filter_map(|facts| facts.base_color.as_ref()).collect();
     let are_png = files.iter().filter(|(_, is_png)| *is_png).count() * 2 >= files.len();
     findings.extend(base_colours::turned(&place, &looks));
-    let exchanged_channels = base_colours::exchanged(&place, &looks);
-    let decoding = match exchanged_channels {
+    let swapped_channels = base_colours::swapped_red_blue(&place, &looks);
+    let decoding = match swapped_channels {
         Some(_) => Decoding::Unknown,
         None => base_colours::decoding(&place, &looks, are_png),
     };
-    findings.extend(exchanged_channels);
+    findings.extend(swapped_channels);
     findings.extend(base_colours::shading_baked_in(&place, &looks));
     for map in Map::ALL {
         let of_map = all.iter().flat_map(|facts| &facts.largest).filter(|(other, _)| *other == map);
@@ -102,7 +102,7 @@ pub(super) fn check(dataset: &Dataset, submission: &Path, scene: &SceneFile) -> 
     }
     // The other maps, and what instances have in common.
     let scalars: Vec<ScalarLook> = all.iter().flat_map(|facts| facts.scalars.iter().copied()).collect();
-    findings.extend(exchanged(&place, &scalars).or_else(|| same_scalars(&place, &scalars)));
+    findings.extend(swapped_scalars(&place, &scalars).or_else(|| same_scalars(&place, &scalars)));
     findings.extend(one_for_all(&place, &all));
     findings.extend(all.iter().filter_map(one_colour));
     findings.extend(left_empty(&place, all.iter().filter_map(|facts| facts.fill.as_ref())));
@@ -147,7 +147,7 @@ fn instance(
         // A missing map, and two files for one map, are findings of `folder`.
         let Ok([path]) = <[_; 1]>::try_from(folder.present(map)) else { return Ok(None) };
         let name = relative(submission, &path);
-        let decoded = match SubmittedFile::read(submission, &path, MAX_MAP_BYTES) {
+        let decoded = match folder.read(&path) {
             Ok(file) => map_file::decode(file, map, || atlases.mesh(at))?,
             Err(fault) => Err(fault),
         };
@@ -182,7 +182,7 @@ fn instance(
 }
 
 /// Roughness and metallic exchanged: most of the scene would be mirrors.
-fn exchanged(place: &str, looks: &[ScalarLook]) -> Option<Finding> {
+fn swapped_scalars(place: &str, looks: &[ScalarLook]) -> Option<Finding> {
     let mirrors = looks.iter().filter(|look| look.roughness < MIRROR.0 && look.metallic > MIRROR.1).count();
     let share = mirrors as f64 / looks.len().max(1) as f64;
     (looks.len() >= FEWEST_PIXELS && share >= MOST_MIRRORS).then(|| {

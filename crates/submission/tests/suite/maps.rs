@@ -1,5 +1,5 @@
-//! The maps of untrusted submissions: malicious and broken pictures are read or refused within limits, and lint reports the
-//! same bad texels that scoring replaces.
+//! The maps of untrusted submissions: malicious and broken pictures are read or refused within limits, and lint reports
+//! the same bad texels that scoring replaces.
 
 use std::cell::Cell;
 use std::io::Write as _;
@@ -194,8 +194,8 @@ fn room() -> &'static SceneFile {
     photos().scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap()
 }
 
-/// `gt` with the maps of every instance of the room written as EXR, each texel `value(instance, x, y, side)` in all channels
-/// where that is a number and the truth elsewhere.
+/// `gt` with the maps of every instance of the room written as EXR, each texel `value(instance, x, y, side)` in all
+/// channels where that is a number and the truth elsewhere.
 fn planted(value: impl Fn(usize, usize, usize, usize) -> Option<f32>) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_truth(&submission(&folder));

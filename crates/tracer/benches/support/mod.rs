@@ -1,5 +1,5 @@
-//! What benchmarks share: a generated furnished room with any number of triangles, and interleaved timing, so that other
-//! load on the machine affects all contestants alike.
+//! What benchmarks share: a generated furnished room with any number of triangles, and interleaved timing, so that
+//! other load on the machine affects all contestants alike.
 #![allow(dead_code, reason = "benchmarks share it, and not each uses all")]
 
 use cpu_time::ProcessTime;

@@ -1,7 +1,8 @@
 //! Ray queries against all triangles of all surfaces, by a bounding volume hierarchy.
 //!
-//! Answers are the same as when every triangle is tested: boxes are padded, and ties go to the triangle of lowest index, so the shape of the tree never shows. Answers are also the same with
-//! every instruction set. Memory: about 90 bytes a triangle, at most 450 (where no two triangles are near each other).
+//! Answers are the same as when every triangle is tested: boxes are padded, and ties go to the triangle of lowest
+//! index, so the shape of the tree never shows. Answers are also the same with every instruction set. Memory: about 90
+//! bytes a triangle, at most 450 (where no two triangles are near each other).
 
 mod kernel;
 mod traverse;
@@ -9,6 +10,7 @@ mod wide;
 
 use glam::Vec3;
 use mateval_dataset::TriangleMesh;
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::reference::SurfaceIndex;
 
 use crate::error::{ElementFault, ExceededLimit, RequestFault, SurfaceFault, TracerError};
@@ -63,9 +65,7 @@ impl Accel {
     /// there are more than 2^31 triangles.
     pub fn build(meshes: &[&TriangleMesh]) -> Result<Self, TracerError> {
         let (corners, starts) = flatten(meshes)?;
-        let points = || corners.iter().flatten().copied();
-        let (low, high) =
-            (points().reduce(Vec3::min).unwrap_or_default(), points().reduce(Vec3::max).unwrap_or_default());
+        let [low, high] = bounds(corners.iter().flatten().copied()).unwrap_or_default();
         let wide = (!corners.is_empty()).then(|| Wide::build(&corners, &starts));
         Ok(Self {
             wide,

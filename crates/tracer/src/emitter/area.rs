@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use mateval_dataset::TriangleMesh;
 use mateval_dataset::material::UvTransform;
+use mateval_dataset::mesh::bounds;
 use mateval_dataset::reference::{EmissionMap, LightIndex, SurfaceIndex};
 use mateval_image::{Texels, Texture};
 
@@ -224,8 +225,7 @@ fn area(mesh: &TriangleMesh, triangle: usize) -> f64 {
 /// The centre of the bounding box of all meshes, and the squared distance of the farthest vertex.
 fn bounding_sphere(meshes: &[&TriangleMesh]) -> (Vec3, f32) {
     let positions = || meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
-    let low = positions().reduce(Vec3::min).unwrap_or_default();
-    let high = positions().reduce(Vec3::max).unwrap_or_default();
+    let [low, high] = bounds(positions()).unwrap_or_default();
     let centre = (low + high) * 0.5;
     (centre, positions().map(|p| p.distance_squared(centre)).fold(0.0, f32::max))
 }

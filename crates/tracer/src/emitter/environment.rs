@@ -5,8 +5,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{Mat3, Vec3};
 use mateval_image::{LinearRgb, Texture};
 
-use crate::sampling;
-use crate::sampling::Distribution;
+use crate::sampling::{self, Distribution};
 
 /// An environment map, importance-sampled by its brightness.
 ///

@@ -15,9 +15,10 @@ const STEPS: usize = 24;
 const LEAST_FACTOR: f64 = 1e-3;
 
 /// How much each light group matters to the noise of pictures under `mixes`, for
-/// [`World::with_group_shares`](crate::World::with_group_shares): the root of the sum over pictures of its squared share
-/// of their luminance. With light samples divided in these proportions, the sum of the pictures' variances is least if
-/// the variance of a group's light follows the square of the light (Cochran, "Sampling techniques", section 5.5).
+/// [`World::with_group_shares`](crate::World::with_group_shares): the root of the sum over pictures of its squared
+/// share of their luminance. With light samples divided in these proportions, the sum of the pictures' variances is
+/// least if the variance of a group's light follows the square of the light (Cochran, "Sampling techniques", section
+/// 5.5).
 pub fn shares_for(mixes: &[LightMix], group_light: &[[f64; 3]]) -> Vec<f64> {
     let mut squares = vec![0.0; group_light.len()];
     for mix in mixes {

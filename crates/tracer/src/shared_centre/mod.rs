@@ -13,11 +13,10 @@ use std::array::from_fn;
 use glam::{DVec2, DVec3, Vec3};
 use mateval_dataset::Camera;
 use mateval_dataset::reference::LightIndex;
-use mateval_image::Picture;
+use mateval_image::{LinearRgb, Picture};
 use rayon::prelude::*;
 
 use crate::error::{RequestFault, TracerError};
-use crate::light_basis::LightBasis;
 use crate::path::{MaterialSource, OwnMaterials, PathCounts, PathTracer, RenderSettings};
 use crate::ray::Ray;
 use crate::render::{self, Progress, RenderStats};
@@ -51,6 +50,70 @@ pub struct ViewsRender {
 pub struct ViewLight {
     /// In the order of the seeds.
     pub by_seed: Vec<LightBasis>,
+}
+
+/// The light of a view, split by its source: pictures of one size, one per group of lights, or per mix of lights.
+///
+/// Light is linear in emission, so any other lighting by the same emitters is a weighted sum of the groups. All
+/// pictures come from the same paths, since no decision along a path depends on radiance ([`crate::emitter`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightBasis {
+    width: usize,
+    height: usize,
+    pictures: Vec<Picture<LinearRgb>>,
+}
+
+impl LightBasis {
+    /// `count` black pictures.
+    pub(crate) fn black(width: usize, height: usize, count: usize) -> Self {
+        Self { width, height, pictures: vec![Picture::filled(width, height, LinearRgb::default()); count] }
+    }
+
+    /// Takes pictures of one size. Fails if the size of one differs.
+    pub fn new(width: usize, height: usize, pictures: Vec<Picture<LinearRgb>>) -> Result<Self, TracerError> {
+        if let Some(other) = pictures.iter().find(|picture| (picture.width(), picture.height()) != (width, height)) {
+            let found = [other.width(), other.height()];
+            return Err(RequestFault::PictureSize { found, expected: [width, height] }.into());
+        }
+        Ok(Self { width, height, pictures })
+    }
+
+    /// Linear radiance, one picture per group.
+    pub fn pictures(&self) -> &[Picture<LinearRgb>] {
+        &self.pictures
+    }
+
+    pub(crate) fn pictures_mut(&mut self) -> &mut [Picture<LinearRgb>] {
+        &mut self.pictures
+    }
+
+    /// The view under the scene's own radiances.
+    pub fn sum(&self) -> Picture<LinearRgb> {
+        self.mix(|_| [1.0; 3])
+    }
+
+    /// The view with each group's radiance scaled by its entry of `weights`, per channel. Fails unless `weights` holds
+    /// one entry per group.
+    pub fn weighted(&self, weights: &[[f64; 3]]) -> Result<Picture<LinearRgb>, TracerError> {
+        if weights.len() != self.pictures.len() {
+            let (found, expected) = (weights.len(), self.pictures.len());
+            return Err(RequestFault::WeightCount { found, expected }.into());
+        }
+        Ok(self.mix(|group| weights[group]))
+    }
+
+    fn mix(&self, weight: impl Fn(usize) -> [f64; 3]) -> Picture<LinearRgb> {
+        let mut sums = vec![[0.0_f64; 3]; self.width * self.height];
+        for (group, picture) in self.pictures.iter().enumerate() {
+            let weight = weight(group);
+            for (sum, value) in sums.iter_mut().zip(picture.pixels()) {
+                for channel in 0..3 {
+                    sum[channel] += weight[channel] * f64::from(value.0[channel]);
+                }
+            }
+        }
+        Picture::from_fn(self.width, self.height, |x, y| LinearRgb(sums[y * self.width + x].map(|v| v as f32)))
+    }
 }
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
@@ -111,7 +174,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         self.seeds.len() * planes.iter().map(|shared| shared.plane.tiles().len()).sum::<usize>()
     }
 
-    /// Renders the views for the subject's material variants, which share their paths and are at most `K`.
+    /// Renders the views for the job's material variants, at most `K`, which share their paths.
     pub(crate) fn render<const K: usize>(&self, planes: &[SharedPlane], progress: &Progress<'_>) -> Vec<ViewsRender>
     where
         M: MaterialSource<'a, K> + Sync,
@@ -489,7 +552,8 @@ fn add(sum: &mut [f64; 3], value: [f64; 3], weight: f64) {
 /// The block of each pixel of each view. Pixels of one block, in any view, may share paths.
 ///
 /// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then
-/// squares of `side` pixels of the image plane of the first of them. Other cameras have blocks of their own.
+/// squares of `side` pixels of the image plane of the first of them; a pixel belongs to the block that its centre lies
+/// in. Other cameras have blocks of their own.
 pub fn noise_blocks(cameras: &[Camera], side: u32) -> Vec<Picture<u64>> {
     let groups = groups_with_one_centre(cameras);
     let of_view = |(view, camera): (usize, &Camera)| {
@@ -511,4 +575,20 @@ fn block(first: &Camera, direction: DVec3, side: u32) -> u32 {
     let at = DVec2::new(k.cx - k.fx * local.x / local.z, k.cy + k.fy * local.y / local.z);
     let step = |value: f64| ((value / f64::from(side)).floor() + 32768.0).clamp(0.0, 65535.0) as u32;
     step(at.y) << 16 | step(at.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_scale_groups_by_channel() {
+        let flat = |value: f32| Picture::filled(2, 1, LinearRgb([value; 3]));
+        let basis = LightBasis::new(2, 1, vec![flat(1.0), flat(2.0)]).unwrap();
+        let mixed = basis.weighted(&[[1.0, 0.0, 0.5], [0.0, 2.0, 0.5]]).unwrap();
+        assert_eq!(mixed.get(1, 0), LinearRgb([1.0, 4.0, 1.5]));
+        assert_eq!(basis.sum(), basis.weighted(&[[1.0; 3]; 2]).unwrap());
+        assert!(basis.weighted(&[[1.0; 3]]).is_err());
+        assert!(LightBasis::new(1, 1, vec![flat(1.0)]).is_err());
+    }
 }

@@ -1,5 +1,5 @@
-//! Agreement between estimators of the same picture, scenes that are refused, and the bytes of pictures: they are the same
-//! for any number of threads, with either instruction set, in every build and on every machine.
+//! Agreement between estimators of the same picture, scenes that are refused, and the bytes of pictures: they are the
+//! same for any number of threads, with either instruction set, in every build and on every machine.
 //!
 //! `tools/test_builds.sh`, run by hand, tests that the optimised build renders these bytes too.
 
@@ -107,8 +107,8 @@ fn ways_of_sampling_agree() {
 
 /// Sampled directions to lights follow the density reported for them. The density of a direction is the sum over all
 /// emitters on a ray along it, integrated over cells of the sphere and compared with 40,000 samples by Pearson's
-/// chi-square, also where the lamps' groups have other shares. The twins: the density for a point 10 cm away, and that of
-/// other shares.
+/// chi-square, also where the lamps' groups have other shares. The twins: the density for a point 10 cm away, and that
+/// of other shares.
 #[test]
 fn directions_to_lights_follow_their_density() {
     // Only lamps and the map, so that nothing blocks light.

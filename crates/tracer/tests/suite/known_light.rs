@@ -265,8 +265,8 @@ const SIZE: u32 = 128;
 const NEST: usize = 4;
 const RENDERS: u64 = 16;
 
-/// The shared test room compared with Mitsuba 3.9.1 (llvm, `path`, max_depth 8, 64 samples, `twosided` `principled`): the
-/// means of both pictures agree to 1 % and within noise, and the 16x16-pixel tiles of the reference agree within
+/// The shared test room compared with Mitsuba 3.9.1 (llvm, `path`, max_depth 8, 64 samples, `twosided` `principled`):
+/// the means of both pictures agree to 1 % and within noise, and the 16x16-pixel tiles of the reference agree within
 /// noise. With lights 3 % brighter neither agrees.
 #[test]
 #[allow(clippy::print_stderr, reason = "the test reports what it measured")]

@@ -1,5 +1,5 @@
-//! Lamps whose radiance follows a texture, and the sky's share of light samples, which follows from the share of rays that
-//! leave the scene.
+//! Lamps whose radiance follows a texture, and the sky's share of light samples, which follows from the share of rays
+//! that leave the scene.
 
 use std::sync::Arc;
 
@@ -303,8 +303,8 @@ fn share(scene: ReferenceScene) -> f32 {
     (0..COUNT).map(density).sum::<f32>() * 4.0 * std::f32::consts::PI / COUNT as f32
 }
 
-/// A wider window gives the sky more samples; a closed room nearly none, an open floor as many as the lamp. Constant sky gets
-/// nearly none anywhere, and all where there is no lamp.
+/// A wider window gives the sky more samples; a closed room nearly none, an open floor as many as the lamp. Constant
+/// sky gets nearly none anywhere, and all where there is no lamp.
 #[test]
 fn the_skys_share_grows_with_the_window() {
     let shares = [0.0, 0.3, 0.8, 2.0].map(|window| share(under_sky(lit(walls(window)), true)));
@@ -343,8 +343,8 @@ fn variance(renders: &Renders) -> f64 {
     variances.iter().sum::<f64>() / variances.len() as f64
 }
 
-/// A sky that no ray reaches leaves the noise of a closed room as it is. The twin: half of the samples cost it more than half
-/// of its precision, as they did when every sky got them.
+/// A sky that no ray reaches leaves the noise of a closed room as it is. The twin: half of the samples cost it more
+/// than half of its precision, as they did when every sky got them.
 #[test]
 fn a_sky_outside_costs_a_closed_room_nothing() {
     let plain = renders(lit(walls(0.0)), LightSampling::Both, 16, 1);
@@ -357,8 +357,8 @@ fn a_sky_outside_costs_a_closed_room_nothing() {
     assert!(variance(&half) / variance(&plain) > 1.5, "the twin passes");
 }
 
-/// A lamp in a closed box lets no probe reach the sky, which lights all that the camera sees: samples of the BSDF alone have
-/// the same mean.
+/// A lamp in a closed box lets no probe reach the sky, which lights all that the camera sees: samples of the BSDF alone
+/// have the same mean.
 #[test]
 fn a_sky_that_no_probe_reaches_still_shines() {
     let boxed = || {

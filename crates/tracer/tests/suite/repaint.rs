@@ -8,9 +8,9 @@ use mateval_dataset::reference::{Emission, ReferenceScene};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_image::{Texels, Texture, Wrap};
 use mateval_tracer::{
-    Coat, LightBasis, LightMix, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World,
+    LightBasis, LightMix, LightSampling, Lighting, Render, RenderSettings, Repaint, Scattering, StageLight,
+    SurfaceMaps, ViewsRender, World, render, render_repainted, render_views,
 };
-use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_views};
 
 use super::estimators::worst;
 use super::views::{lit_room, view};
@@ -27,15 +27,15 @@ fn scattering(roughness: f32, metallic: f32) -> Scattering {
     Scattering { roughness: flat([roughness; 3]), metallic: flat([metallic; 3]) }
 }
 
-/// One coat with these colours on all walls and lamps; the metal sphere keeps its own material.
-fn coats(scene: &ReferenceScene, colors: &[[f32; 3]], roughness: f32, metallic: f32) -> Vec<Option<Coat>> {
-    let coat = |mesh: &TriangleMesh| {
-        mesh.uvs.as_ref().map(|_| Coat {
+/// Maps with these colours on all walls and lamps; the metal sphere keeps its own material.
+fn maps(scene: &ReferenceScene, colors: &[[f32; 3]], roughness: f32, metallic: f32) -> Vec<Option<SurfaceMaps>> {
+    let of_mesh = |mesh: &TriangleMesh| {
+        mesh.uvs.as_ref().map(|_| SurfaceMaps {
             base_colors: colors.iter().map(|color| flat(*color)).collect(),
             scattering: scattering(roughness, metallic),
         })
     };
-    scene.surfaces.iter().map(|surface| coat(&surface.mesh)).collect()
+    scene.surfaces.iter().map(|surface| of_mesh(&surface.mesh)).collect()
 }
 
 fn atlases(scene: &ReferenceScene) -> Vec<TriangleMesh> {
@@ -66,8 +66,8 @@ fn paint_is_the_material_itself_and_company_changes_nothing() {
         [(PrincipledFlavour::Blender, 0.4, 0.5), (PrincipledFlavour::Mitsuba, 0.7, 0.0)]
     {
         let painted = |colors: &[[f32; 3]]| {
-            let coats = coats(&scene, colors, roughness, metallic);
-            let repaint = Repaint::new(&world, &atlases(&scene), coats, flavour).unwrap();
+            let maps = maps(&scene, colors, roughness, metallic);
+            let repaint = Repaint::new(&world, &atlases(&scene), maps, flavour).unwrap();
             repainted(&world, &repaint, Lighting::Apart)
         };
         let together = painted(&COLORS);
@@ -90,8 +90,8 @@ fn two_roughnesses_share_paths_without_bias() {
     let world = World::new(scene.clone()).unwrap();
     let (smooth, rough) = ((0.25, 0.8), (0.7, 0.0));
     let repaint = |(roughness, metallic): (f32, f32)| {
-        let coats = coats(&scene, &COLORS[..2], roughness, metallic);
-        Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap()
+        let maps = maps(&scene, &COLORS[..2], roughness, metallic);
+        Repaint::new(&world, &atlases(&scene), maps, PrincipledFlavour::Blender).unwrap()
     };
     let second = |(roughness, metallic): (f32, f32)| -> Vec<Option<Scattering>> {
         scene
@@ -130,8 +130,8 @@ fn two_roughnesses_share_paths_without_bias() {
 fn mixes_are_those_of_the_basis() {
     let scene = Arc::new(lit_room([[1.0; 3]; 4]));
     let world = World::new(scene.clone()).unwrap();
-    let coats = coats(&scene, &COLORS[..2], 0.5, 0.0);
-    let repaint = Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap();
+    let maps = maps(&scene, &COLORS[..2], 0.5, 0.0);
+    let repaint = Repaint::new(&world, &atlases(&scene), maps, PrincipledFlavour::Blender).unwrap();
     let odd = vec![[0.0, 1.0, 0.0], [2.0; 3], [0.1; 3], [1.0, 0.0, 3.0]];
     let mixes = [vec![vec![[0.5, 1.0, 2.0]; 4], vec![[1.0; 3]; 4]], vec![odd, vec![[0.3; 3]; 4]]];
     let mixed = repainted(&world, &repaint, Lighting::Mixed(&mixes));
@@ -151,13 +151,13 @@ fn mixes_are_those_of_the_basis() {
 fn what_does_not_fit_is_refused() {
     let scene = Arc::new(lit_room([[1.0; 3]; 4]));
     let world = World::new(scene.clone()).unwrap();
-    let new = |atlases: &[TriangleMesh], coats| {
-        Repaint::new(&world, atlases, coats, PrincipledFlavour::Blender).map(|_| ()).unwrap_err().to_string()
+    let new = |atlases: &[TriangleMesh], maps| {
+        Repaint::new(&world, atlases, maps, PrincipledFlavour::Blender).map(|_| ()).unwrap_err().to_string()
     };
     let atlases = atlases(&scene);
-    let good = coats(&scene, &COLORS, 0.5, 0.0);
+    let good = maps(&scene, &COLORS, 0.5, 0.0);
     assert!(new(&atlases[1..], good.clone()).contains(&format!(
-        "{} atlases and {} coats",
+        "{} atlases and maps of {} surfaces",
         atlases.len() - 1,
         atlases.len()
     )));
@@ -219,8 +219,8 @@ fn a_stage_lights_the_floor_and_hides_nothing() {
     assert!(seen(&world.on_stage(&turned).unwrap(), &camera)[0] < 1e-5 * expected);
 }
 
-/// What the camera sees of a square lamp above a floor of the given base colour, roughness and metallic: as a light of a
-/// stage, or as a surface of the scene.
+/// What the camera sees of a square lamp above a floor of the given base colour, roughness and metallic: as a light of
+/// a stage, or as a surface of the scene.
 fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, staged: bool) -> f64 {
     let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
     let model = principled([color; 3], roughness, metallic, flavour);
@@ -236,8 +236,8 @@ fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, 
     seen(&world, &camera)[0]
 }
 
-/// Facets of no roughness show a stage: a black floor of plastic shows nothing of the square above it. As a surface of the
-/// scene, the same square is mirrored.
+/// Facets of no roughness show a stage: a black floor of plastic shows nothing of the square above it. As a surface of
+/// the scene, the same square is mirrored.
 #[test]
 fn no_facets_show_a_stage() {
     let black = |roughness: f32, staged: bool| shine(PrincipledFlavour::Blender, 0.0, roughness, 0.0, staged);
@@ -247,8 +247,8 @@ fn no_facets_show_a_stage() {
     assert!((black(0.1, false) - 0.04).abs() < 2e-3 && black(0.4, false) > 0.01);
 }
 
-/// Metal reflects a stage as a Lambertian surface of its base colour does, at every roughness, less what Blender's facets
-/// absorb between each other. As a surface of the scene, the square is far brighter in smooth metal.
+/// Metal reflects a stage as a Lambertian surface of its base colour does, at every roughness, less what Blender's
+/// facets absorb between each other. As a surface of the scene, the square is far brighter in smooth metal.
 #[test]
 fn metal_is_matt_on_a_stage() {
     for flavour in [PrincipledFlavour::Blender, PrincipledFlavour::Mitsuba] {

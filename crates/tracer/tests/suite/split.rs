@@ -67,8 +67,8 @@ fn split(world: &World, photo: &Picture<LinearRgb>, cached: &Mask, samples: u32)
     split_as(world, photo, cached, COLOR, samples)
 }
 
-/// Base colour times the diffuse part plus gloss, over the photo: its mean, and the root mean square deviation of blocks of
-/// 4x4 pixels.
+/// Base colour times the diffuse part plus gloss, over the photo: its mean, and the root mean square deviation of
+/// blocks of 4x4 pixels.
 fn ratio(split: &SplitLight, photo: &Picture<LinearRgb>) -> [f64; 2] {
     let ones = vec![[1.0; 3]; split.diffuse.pictures().len()];
     let (diffuse, gloss) = (split.diffuse.weighted(&ones).unwrap(), split.gloss.weighted(&ones).unwrap());
@@ -87,8 +87,8 @@ fn ratio(split: &SplitLight, photo: &Picture<LinearRgb>) -> [f64; 2] {
     [mean, square.sqrt()]
 }
 
-/// With true colours the parts make the photo again, whether light that has scattered elsewhere is traced or read from the
-/// photo. A twin with the colours of later surfaces halved does not.
+/// With true colours the parts make the photo again, whether light that has scattered elsewhere is traced or read from
+/// the photo. A twin with the colours of later surfaces halved does not.
 #[test]
 fn the_parts_make_the_photo_again() {
     let (world, photo) = &*ROOM;

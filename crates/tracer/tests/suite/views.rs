@@ -1,5 +1,5 @@
-//! Five views from one set of paths compared with five renders, the properties of such views, and their light by groups:
-//! its weighted sums equal renders of the same scene under other lights.
+//! Five views from one set of paths compared with five renders, the properties of such views, and their light by
+//! groups: its weighted sums equal renders of the same scene under other lights.
 
 use std::sync::Arc;
 
@@ -279,8 +279,8 @@ fn halves_are_independent() {
 }
 
 /// Under an even sky a pixel is the number of its paths over the number expected, which is at least the request: every
-/// pixel gets nearly what it is due. The union of the pictures, plus the surplus where the plane is stretched, costs the
-/// paths of 1.73 of the five views.
+/// pixel gets nearly what it is due. The union of the pictures, plus the surplus where the plane is stretched, costs
+/// the paths of 1.73 of the five views.
 #[test]
 fn every_pixel_gets_its_samples() {
     let world = Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();

@@ -2,9 +2,9 @@
 //!
 //! In: a reference scene, the parts of its instances, and views. Out: [`BlenderView`]s. Between: a job for
 //! `blender_scripts/render.py`, which is a folder with `job.json`, meshes as raw little-endian numbers and textures as
-//! linear EXR files; `process` copies the scripts into it, runs Blender and enforces limits; multi-layer EXR files hold
-//! the pictures of each view. Textures are decoded here, since Cycles interpolates 8-bit sRGB before it decodes it,
-//! while the built-in tracer decodes first.
+//! linear EXR files; [`mateval_sources::blend::process`] copies the scripts into it, runs Blender and enforces limits;
+//! multi-layer EXR files hold the pictures of each view. Textures are decoded here, since Cycles interpolates 8-bit sRGB
+//! before it decodes it, while the built-in tracer decodes first.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ use mateval_dataset::reference::{LightGroup, ReferenceScene, Surface};
 use mateval_dataset::render_file::{DeviceKind, RenderDevice};
 use mateval_dataset::{Camera, SceneId, TriangleMesh, ViewId, json, word_enum};
 use mateval_files::FileError;
+use mateval_files::work_folder::make_folder;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Normal, Picture, Texels, Texture, Wrap};
 use mateval_sources::blend::process;
@@ -82,7 +83,7 @@ pub enum BlenderEvent<'a> {
 impl JobFolder {
     /// Writes the job into the folder, which is created if it does not exist.
     pub fn prepare(folder: &Path, plan: &JobPlan<'_>) -> Result<Self, PrepError> {
-        std::fs::create_dir_all(folder).map_err(FileError::io("make", folder))?;
+        make_folder(folder)?;
         write_job(folder, plan)?;
         let script = process::write_scripts(folder)?;
         Ok(Self { folder: folder.to_owned(), script, groups: plan.reference.lights.len() })
@@ -286,7 +287,7 @@ pub struct JobPlan<'a> {
 fn write_job(folder: &Path, plan: &JobPlan<'_>) -> Result<(), PrepError> {
     for name in ["meshes", "textures"] {
         let path = folder.join(name);
-        std::fs::create_dir_all(&path).map_err(FileError::io("make", path))?;
+        make_folder(&path)?;
     }
     let surfaces = plan.reference.surfaces.iter().zip(plan.parts).enumerate();
     let surfaces = surfaces.map(|(at, (surface, parts))| write_surface(folder, at, surface, parts));
