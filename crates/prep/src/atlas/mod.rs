@@ -77,7 +77,7 @@ pub fn shape_key(mesh: &TriangleMesh) -> Key {
 pub struct AtlasCache {
     cache: Cache,
     makers_sha256: String,
-    /// Faults of the cache, none of which ends a build.
+    /// Faults of the cache. They end no build.
     remarks: Mutex<Vec<String>>,
 }
 

@@ -247,8 +247,8 @@ fn no_facets_show_a_stage() {
     assert!((black(0.1, false) - 0.04).abs() < 2e-3 && black(0.4, false) > 0.01);
 }
 
-/// Metal reflects a stage as a Lambertian surface of its base colour does, at every roughness, less what Blender's
-/// facets absorb between each other. As a surface of the scene, the square is far brighter in smooth metal.
+/// Metal reflects a stage as a Lambertian surface of its base colour does, at every roughness; Blender's facets absorb a
+/// little between each other. As a surface of the scene, the square is far brighter in smooth metal.
 #[test]
 fn metal_is_matt_on_a_stage() {
     for flavour in [PrincipledFlavour::Blender, PrincipledFlavour::Mitsuba] {
