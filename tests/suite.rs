@@ -13,6 +13,7 @@ mod suite {
     mod bad_input;
     mod blender;
     mod blender_import;
+    mod captured_export;
     mod circles;
     mod command;
     mod compare;

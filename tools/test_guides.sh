@@ -2,7 +2,7 @@
 # Runs every command of the guides (dataset_spec/guides/*.md), literally and in order, and checks the figures, files and
 # lines of output that they state. Arguments name guides: tools/test_guides.sh harder_tasks
 #
-# - A block ```sh is run; a block ```toml is written to the file that its first line names (`# FILE.toml`).
+# - A block ```sh is run; a block ```toml or ```python is written to the file that its first line names (`# FILE.toml`).
 # - A block that begins with `# Not run:` is listed as skipped.
 # - A table below `<!-- figures: RESULT.json KEY... -->` states values of these keys; the first column replaces `{}` in
 #   the file's name.
@@ -17,11 +17,15 @@ if [ -z "${MATEVAL:-}" ]; then
     cargo test --workspace --no-run --quiet
     MATEVAL="${CARGO_TARGET_DIR:-target}/debug/mateval"
 fi
+# The scripts of guides need NumPy.
+tools/apt_install.sh python3-venv
+venv="${CARGO_TARGET_DIR:-target}/independent"
+tools/venv.sh python3.11 "$venv" tests/independent/requirements.txt
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/bin"
 ln -s "$(realpath "$MATEVAL")" "$work/bin/mateval"
-PATH="$work/bin:$PATH" python3 - "$work" "$@" <<'PY'
+PATH="$work/bin:$(realpath "$venv")/bin:$PATH" python3 - "$work" "$@" <<'PY'
 import json
 import pathlib
 import re
@@ -38,6 +42,7 @@ EXPECTED = {
     "method_author": ("author_and_keeper", 7, 0, 6),
     "leaderboard_keeper": ("author_and_keeper", 7, 2, 0),
     "your_own_room": ("your_own_room", 5, 0, 3),
+    "measured_colours": ("measured_colours", 3, 0, 0),
 }
 TOLERANCE = 0.1  # of a figure, which has one decimal
 
@@ -59,8 +64,8 @@ def script(guide, text):
             print(f"{guide}.md:{line}: skipped ({first.removeprefix('# Not run:').strip()})")
             skipped += 1
             continue
-        file = re.fullmatch(r"# (\w+\.toml)", first)
-        if language == "toml" and file:
+        file = re.fullmatch(r"# (\w+\.(?:toml|py))", first)
+        if language in ("toml", "python") and file:
             content = f"cat > {file[1]} <<'END_OF_BLOCK'\n{content}END_OF_BLOCK\n"
         elif language != "sh":
             sys.exit(f"{guide}.md:{line}: a block of '{language}' that is neither run, written nor marked as skipped")

@@ -113,7 +113,8 @@ def instances(*, scenes: list[str], psnr: float) -> list[dict]:
 
 
 def result(
-    *, method: str, psnr: float, scenes: list[str], seed: int, not_predicted: Sequence[str] = (), **said: object
+    *, method: str, psnr: float, scenes: list[str], seed: int, not_predicted: Sequence[str] = (), manifest: str = MANIFEST,
+    **said: object,
 ) -> dict:
     """A whole RESULT.json; two scenes share a house. Maps that are not predicted have no values."""
     example = json.loads(EXAMPLE.read_text())
@@ -128,7 +129,7 @@ def result(
     values = {scene: scene_means(of_scene) for scene, of_scene in pictures.items()}
     scores = {
         "protocol": protocol,
-        "fingerprint": sha256(pretty([protocol, MANIFEST, scenes, WEIGHTS])),
+        "fingerprint": sha256(pretty([protocol, manifest, scenes, WEIGHTS])),
         "summary": summary([values[scene] for scene in sorted(scenes)]),
         "scenes": values, "summary_noise": summary_noise(len(scenes)), "noise": {scene: dict(NOISE) for scene in scenes},
         "fits": {}, "pictures": [one for of_scene in pictures.values() for one in of_scene], "texels": [],
@@ -138,7 +139,7 @@ def result(
         "format": "mateval-result/6", "tool": "mateval 0.1.0", "method": method,
         "submission": {"sha256": sha256(method + str(seed)), "description": said.pop("description", ""), **said},
         "dataset": {
-            "name": "synthetic", "version": "1.0", "manifest_sha256": MANIFEST, "scenes": scenes,
+            "name": "synthetic", "version": "1.0", "manifest_sha256": manifest, "scenes": scenes,
             "total_scenes": len(scenes), "photo_renderer": "builtin",
             "houses": {scene: f"house-{at // 2 if len(scenes) > 12 else at}" for at, scene in enumerate(scenes)},
         },

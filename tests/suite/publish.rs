@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use mateval_files::untrusted::sha256_of_bytes;
+use mateval_image::{Picture, png_io};
 use mateval_testkit::{copy_folder, kept_folder};
 
 use super::command::{Run, baseline, build, mateval, render, run, run_words, score, verify};
@@ -193,11 +194,14 @@ fn a_competition_shows_rounded_numbers_alone() {
     run(&mut baseline("median", &SPLIT.join("public"), &app.join("input/res/folder"))).ends_with(0);
     std::fs::create_dir_all(&output).unwrap();
     let metadata = std::fs::read_to_string(app.join("program/metadata.yaml")).unwrap();
-    assert_eq!(metadata, "command: sh /app/program/score.sh rounded\n");
+    assert_eq!(metadata, "command: sh /app/program/score.sh rounded mateval-3\n");
     let paths = std::env::var("PATH").unwrap();
     let bin = Path::new(env!("CARGO_BIN_EXE_mateval")).parent().unwrap();
     let mut program = std::process::Command::new("sh");
-    program.env("PATH", format!("{}:{paths}", bin.display())).arg(app.join("program/score.sh")).arg("rounded");
+    program
+        .env("PATH", format!("{}:{paths}", bin.display()))
+        .arg(app.join("program/score.sh"))
+        .args(["rounded", "mateval-3"]);
     let printed = run(program.arg(app.join("input")).arg(&output)).ends_with(0).stdout;
     assert_eq!((printed.as_str(), files_below(&output).len()), ("", 2));
 
@@ -215,6 +219,62 @@ fn a_competition_shows_rounded_numbers_alone() {
         assert!(page.contains(key) && !page.contains(&exact), "{key}");
     }
     assert!(!page.contains("<img") && !page.contains("\"instances\""), "{page}");
+}
+
+/// A box with one photo and one measured colour, below `folder`, as a dataset.
+fn captured_box(folder: &Path) -> PathBuf {
+    let corner = |at: u32| [(at & 1) as i32 * 4 - 2, (at >> 1 & 1) as i32 * 3, (at >> 2) as i32 * 3 - 2];
+    let vertices: String = (0..8).map(corner).map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let faces = "4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n4 0 2 3 1\n4 4 5 7 6\n";
+    let mesh = format!(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 6\nproperty list uchar int vertex_indices\nend_header\n{vertices}{faces}"
+    );
+    let cameras = r#"{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [{"file_path": "images/1.png",
+        "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 1.5], [0, 0, 1, 0.5], [0, 0, 0, 1]]}]}"#;
+    let measured = r#"{"format": "mateval-measurements/1", "regions": [{"name": "wall", "photo": "1", "mask": "mask.png",
+        "value": 1, "color": [0.5, 0.4, 0.3]}]}"#;
+    let recipe = "name = \"box\"\nresolution = [32, 24]\natlas_size = 64\n[[scene]]\nid = \"box\"\n[scene.capture]\n\
+                  mesh = \"mesh.ply\"\ncameras = \"cameras.json\"\nphotos = \"images\"\ninput = \"1\"\n\
+                  measured = \"measured.json\"\n";
+    std::fs::create_dir_all(folder.join("images")).unwrap();
+    for (file, text) in
+        [("mesh.ply", mesh.as_str()), ("cameras.json", cameras), ("measured.json", measured), ("recipe.toml", recipe)]
+    {
+        std::fs::write(folder.join(file), text).unwrap();
+    }
+    let photo = Picture::from_fn(32, 24, |x, y| [120 + x as u8, 110 + y as u8, 90]);
+    png_io::write_rgb_bytes(&folder.join("images/1.png"), &photo).unwrap();
+    let mask = Picture::from_fn(32, 24, |x, y| u8::from((10..20).contains(&x) && (8..16).contains(&y)));
+    png_io::write_grey_bytes(&folder.join("mask.png"), &mask).unwrap();
+    let dataset = folder.join("dataset");
+    run(mateval().args(["prep", "build"]).arg(folder.join("recipe.toml")).arg("--out").arg(&dataset)).ends_with(0);
+    dataset
+}
+
+/// Captured rooms have a protocol of their own, and a competition's program scores by it.
+#[test]
+fn a_competition_of_captured_rooms_scores_measured_colours() {
+    let out = tempfile::tempdir().unwrap();
+    let [bundle, app, output] = ["bundle", "app", "app/output"].map(|name| out.path().join(name));
+    let dataset = captured_box(&out.path().join("box"));
+    let mut command = mateval();
+    let words = ["prep", "export", "--as", "codabench", "--image", "example/mateval:1", "--out"];
+    command.args(words).arg(&bundle).arg(&dataset);
+    run(&mut command).ends_with(0).prints("1 task");
+    copy_folder(&bundle.join("data/scoring_program"), &app.join("program"));
+    copy_folder(&bundle.join("data/reference_0"), &app.join("input/ref"));
+    run(&mut baseline("grey", &dataset, &app.join("input/res"))).ends_with(0);
+    std::fs::create_dir_all(&output).unwrap();
+    let bin = Path::new(env!("CARGO_BIN_EXE_mateval")).parent().unwrap();
+    let mut program = std::process::Command::new("sh");
+    program.env("PATH", format!("{}:{}", bin.display(), std::env::var("PATH").unwrap()));
+    program.arg(app.join("program/score.sh")).args(["whole", "capture-1"]).arg(app.join("input")).arg(&output);
+    run(&mut program).ends_with(0);
+    let scores = json(&output.join("scores.json"));
+    assert!(scores["measured_input_region_delta_e"].as_f64().is_some_and(|error| error > 1.0), "{scores}");
+    let page = std::fs::read_to_string(output.join("detailed_results.html")).unwrap();
+    assert!(page.contains("grey") && page.contains("PSNR") && !page.contains("<img"), "{page}");
 }
 
 /// Fault 4: the next step of the guide packed the whole dataset without a word.
@@ -255,6 +315,32 @@ fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
     run(&mut words("public")).ends_with(0);
     let text = std::fs::read_to_string(report.join("release.json")).unwrap();
     assert!(text.contains("\"secrecy\": \"secret\"") && text.contains("\"remake\": null"), "{text}");
+}
+
+/// A folder of pictures of the truth was copied into a site that everybody sees.
+#[test]
+fn a_board_of_a_hidden_split_shows_its_truth_only_if_asked() {
+    let out = tempfile::tempdir().unwrap();
+    let [_, result] = &*GREY;
+    let [set, site] = ["set", "site"].map(|name| out.path().join(name));
+    let board = |words: &[&str]| {
+        let mut command = mateval();
+        run(command.args(["eval", "leaderboard"]).arg(result).arg("--out").arg(&site).args(words))
+    };
+    for method in ["grey", "_truth"] {
+        let folder = set.join(method).join("room/input");
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("albedo.png"), method).unwrap();
+    }
+    let pictures = ["--pictures", set.to_str().unwrap()];
+    board(&pictures).ends_with(2).says("_truth/room/input/albedo.png").says("--with-ground-truth");
+    board(&["--with-ground-truth"]).ends_with(2);
+    assert!(!site.exists());
+    board(&[&pictures[..], &["--with-ground-truth"]].concat()).ends_with(0);
+    // The twin shows what everybody may see.
+    std::fs::remove_dir_all(set.join("_truth")).unwrap();
+    board(&[&pictures[..], &["--force"]].concat()).ends_with(0);
+    assert!(site.join("pictures/grey/room/input/albedo.png").exists() && !site.join("pictures/_truth").exists());
 }
 
 #[test]

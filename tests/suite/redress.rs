@@ -117,7 +117,9 @@ fn the_dataset_states_what_is_no_good_secret() {
     let living = scene("first", "living")["source"].clone();
     assert_eq!([&living["states_roughness"], &living["states_metallic"]], [&Value::from(true); 2]);
     run(&mut verify(&BUILT.join("first"))).ends_with(0);
-    run(&mut stats(&BUILT.join("first"))).ends_with(0).prints("local contrast");
+    let beside = run(stats(&BUILT.join("first")).arg("--beside").arg(BUILT.join("original"))).ends_with(0);
+    let share = (total + scene("first", "living")["redressed"]["weak_area_share"].as_f64().unwrap()) / 2.0;
+    assert!(beside.stdout.contains(&format!("  weak area share    {share:.3}\n")), "{}", beside.stdout);
 }
 
 /// Lamps shine as before, glass is the same, and no texture of the source stays but those of lights.

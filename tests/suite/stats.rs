@@ -221,6 +221,38 @@ fn the_picture_is_written_and_always_the_same() {
     assert!(serde_json::from_str::<Value>(&printed.stdout).is_ok() && path.is_file(), "{}", printed.stdout);
 }
 
+/// A dataset beside itself has distance zero, in the table and exactly in the JSON. A look cannot be compared where the
+/// ground truth is withheld.
+#[test]
+fn a_dataset_beside_itself() {
+    let beside = |original: &Path| {
+        let mut command = stats(dataset());
+        command.arg("--beside").arg(original);
+        command
+    };
+    run(&mut beside(dataset()))
+        .ends_with(0)
+        .prints("True albedo of 1 input view, beside 1 of sample 0.1.0\n")
+        .prints("                      mean  original  deviation  original  distance\n")
+        .prints("  luminance          0.308     0.308      0.280     0.280     0.000\n");
+    let printed = run(beside(dataset()).args(["--format", "json"])).ends_with(0);
+    let found: Value = serde_json::from_str(&printed.stdout).unwrap();
+    let schema = json(&Path::new(env!("CARGO_MANIFEST_DIR")).join("dataset_spec/schema/stats.schema.json"));
+    assert!(jsonschema::validator_for(&schema).unwrap().is_valid(&found), "{}", printed.stdout);
+    for quantity in ["luminance", "lightness", "chroma", "local_contrast", "fine_share"] {
+        assert_eq!(found["beside"]["distance"][quantity], 0.0, "{quantity}");
+        assert_eq!(found["beside"]["look"][quantity], found["look"][quantity]);
+    }
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().join("look.svg");
+    run(beside(dataset()).arg("--picture").arg(&path)).ends_with(0);
+    assert!(std::fs::read_to_string(&path).unwrap().contains(">sample 0.1.0 (original)</text>"));
+    run(beside(dataset()).arg("--findings")).ends_with(2).says("--findings");
+    let copy = copied_dataset();
+    std::fs::remove_dir_all(copy.path().join("scenes/room/ground_truth/views")).unwrap();
+    run(&mut beside(copy.path())).ends_with(2).says("its ground truth is withheld");
+}
+
 /// A picture replaces a file only with --force and never lies in the dataset, which would become unsound.
 #[test]
 fn places_that_a_picture_must_not_have() {

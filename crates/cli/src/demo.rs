@@ -425,6 +425,7 @@ fn write_leaderboard(demo: &DemoFolder, options: &Options, dataset: &Dataset) ->
             shown: vec![Shown::Albedo],
         }),
         votes: false,
+        original: None,
         tool: TOOL.to_owned(),
     };
     with_progress(|progress| leaderboard::write(&plan, &demo.leaderboard, true, progress))

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use mateval_dataset::manifest::check_opened;
-use mateval_dataset::open::check_outside_datasets;
+use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::withheld::Secret;
 use mateval_dataset::{SceneId, Severity, json};
 use mateval_files::whole::write_whole;
@@ -166,7 +166,10 @@ pub struct StatsArgs {
     /// How to print the counts.
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
-    /// SVG file for a chart of the counts; must lie outside the dataset.
+    /// Lay the look of another dataset's true albedo beside this one's, as of the rooms before they were redressed.
+    #[arg(long, value_name = "ORIGINAL", conflicts_with = "findings")]
+    beside: Option<PathBuf>,
+    /// SVG file for a chart of the counts, or with --beside of both looks; must lie outside the dataset.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
     /// Sum up the findings about the sources instead, by code and by scene.
@@ -178,13 +181,14 @@ pub struct StatsArgs {
 }
 
 impl StatsArgs {
-    /// Counts, draws the chart where one is asked for, and prints the counts or the findings.
+    /// Counts, compares looks and draws the chart where asked for, and prints the counts or the findings.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         if let Some(picture) = &self.picture {
             check_outside_datasets(picture, "--picture")?;
             check_output_file(picture, "--picture", "picture", self.force)?;
         }
         let dataset = open_dataset(&self.dataset)?;
+        let original = self.beside.as_deref().map(open_dataset).transpose()?;
         if self.findings {
             let found = stats::findings::findings(&dataset, TOOL);
             match self.format {
@@ -195,6 +199,14 @@ impl StatsArgs {
         }
         let mut counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
         counted.look = stats::look::look(&dataset)?;
+        if let Some(original) = &original {
+            let withheld = |dataset: &Dataset| {
+                let root = dataset.root.display();
+                format!("cannot compare the look of '{root}': its ground truth is withheld; name a copy that has it")
+            };
+            let look = counted.look.as_ref().with_context(|| withheld(&dataset))?;
+            counted.beside = Some(look.beside(original)?.with_context(|| withheld(original))?);
+        }
         if let Some(picture) = &self.picture {
             write_whole(picture, stats::show::picture(&counted).as_bytes())?;
         }

@@ -297,6 +297,21 @@ word_enum! {
 }
 
 impl PictureKind {
+    /// What tables, boards and pages call it.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Albedo => "Albedo",
+            Self::AlbedoAligned => "Aligned albedo",
+            Self::RgbTrue => "RGB, true light",
+            Self::RgbFitted => "RGB, fitted light",
+            Self::RgbRelit => "RGB, relit",
+            Self::Roughness => "Roughness",
+            Self::Metallic => "Metallic",
+            Self::TextureBaseColor => "Base colour texels",
+            Self::Measured => "Measured colours",
+        }
+    }
+
     /// The map that it shows; none for light, which comes from all of them.
     pub const fn map(self) -> Option<Map> {
         match self {

@@ -68,7 +68,7 @@ impl PicturesDir {
         quarters: &[Picture<LinearRgb>],
         guide: &ViewGuide<'_>,
     ) -> Result<(), EvalError> {
-        let kind = track.picture();
+        let kind = track.row().picture;
         let name = lighting.map_or_else(|| kind.to_string(), |name| format!("{kind}-{name}"));
         let folder = self.view(submission, scene, view).join(&name);
         write(&folder, "reference", guide.reference)?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mateval_dataset::dataset::SceneFile;
-use mateval_dataset::lighting::RelitRules;
+use mateval_dataset::lighting::{LightingName, RelitRules, lightings};
 use mateval_dataset::material::PrincipledFlavour;
 use mateval_dataset::{SceneId, word_enum};
 use mateval_light::light_fit::FitRules;
@@ -11,6 +11,7 @@ use mateval_light::light_stage::StageRules;
 use mateval_light::photo_pixels::PhotoRules;
 use mateval_metrics::mask_rule::MaskRule;
 use mateval_metrics::measured::{MAW_LEAST, MAW_SIZE};
+use mateval_tracer::LightMix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -79,14 +80,14 @@ impl MeasuredRules {
 /// changed.
 pub const SCORER_VERSION: u32 = 12;
 
-/// The protocol of captured scenes.
-const CAPTURE: &str = "capture-1";
-
 impl Protocol {
-    pub const NAMES: [&str; 3] = [Self::DEFAULT, "paper", CAPTURE];
+    pub const NAMES: [&str; 3] = [Self::DEFAULT, "paper", Self::CAPTURE];
 
     /// The protocol of commands that name none.
     pub const DEFAULT: &str = "mateval-3";
+
+    /// The protocol of captured scenes.
+    pub const CAPTURE: &str = "capture-1";
 
     pub fn named(name: &str) -> Result<Self, EvalError> {
         // PSNR under fitted light is near 22 dB, so 16 plain samples are enough.
@@ -102,7 +103,7 @@ impl Protocol {
             }
             "paper" => (MaskRule::BlackFill, AlbedoSpace::Srgb, fitted()),
             // Of a captured room only measured colours and photos are known.
-            CAPTURE => (MaskRule::Inside, AlbedoSpace::Linear, fitted()),
+            Self::CAPTURE => (MaskRule::Inside, AlbedoSpace::Linear, fitted()),
             _ => return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES }),
         };
         Ok(Self {
@@ -114,12 +115,12 @@ impl Protocol {
             rounded_decimals: 6,
             headline: match name {
                 "paper" => PAPER_HEADLINE.to_vec(),
-                CAPTURE => CAPTURE_HEADLINE.to_vec(),
+                Self::CAPTURE => CAPTURE_HEADLINE.to_vec(),
                 _ => HEADLINE.to_vec(),
             },
             light,
-            measured: (name == CAPTURE).then_some(MeasuredRules::OF_THIS_SCORER),
-            photos: (name == CAPTURE).then(PhotoRules::default),
+            measured: (name == Self::CAPTURE).then_some(MeasuredRules::OF_THIS_SCORER),
+            photos: (name == Self::CAPTURE).then(PhotoRules::default),
             fixed: FixedRules::of_this_scorer(),
             scorer_version: SCORER_VERSION,
         })
@@ -177,12 +178,21 @@ word_enum! {
     Relit = "relit",
 }
 
+/// What sets a track apart, besides its lightings.
+pub struct TrackRow {
+    pub picture: PictureKind,
+    /// Whether renders are compared with the photo, to which radiances are fitted; all others are compared with R.
+    pub is_fitted: bool,
+    /// Whether its errors are also stated by instance, and its pictures shown on pages.
+    pub is_shown: bool,
+}
+
 impl Track {
-    pub fn picture(self) -> PictureKind {
+    pub const fn row(self) -> TrackRow {
         match self {
-            Self::Fitted => PictureKind::RgbFitted,
-            Self::True => PictureKind::RgbTrue,
-            Self::Relit => PictureKind::RgbRelit,
+            Self::Fitted => TrackRow { picture: PictureKind::RgbFitted, is_fitted: true, is_shown: true },
+            Self::True => TrackRow { picture: PictureKind::RgbTrue, is_fitted: false, is_shown: true },
+            Self::Relit => TrackRow { picture: PictureKind::RgbRelit, is_fitted: false, is_shown: false },
         }
     }
 }
@@ -236,6 +246,19 @@ impl LightRules {
             samples: SampleRules { seed: "mateval".to_owned(), each_half: 8, block_pixels: 16 },
         }
     }
+
+    /// The lightings of a track, as weights of the scene's own light groups; empty if lights are fitted. `group_light` is
+    /// the light of each group in R's input view.
+    pub(crate) fn lightings_of(&self, track: Track, group_light: &[[f64; 3]]) -> Vec<(Option<LightingName>, LightMix)> {
+        match track {
+            Track::Fitted => Vec::new(),
+            Track::True => vec![(None, vec![[1.0; 3]; group_light.len()])],
+            Track::Relit => {
+                let relit = lightings(&self.relit, group_light).into_iter();
+                relit.map(|lighting| (Some(lighting.name), lighting.weights)).collect()
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -260,32 +283,39 @@ mod tests {
         assert_eq!(prints.len(), 6);
     }
 
-    /// `PROTOCOL.md` holds the table of metrics and the hashes; with `MATEVAL_WRITE_DOCS=1` this writes them. A
-    /// constant that changes a hash raises [`SCORER_VERSION`] if numbers of the same protocol change.
+    /// `PROTOCOL.md` holds the table of metrics and the hashes, the example of a result the protocol; with
+    /// `MATEVAL_WRITE_DOCS=1` this writes them. A constant that changes a hash raises [`SCORER_VERSION`] if numbers of
+    /// the same protocol change.
     #[test]
     fn published_tables_hold() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../dataset_spec/PROTOCOL.md");
-        let before = std::fs::read_to_string(path).unwrap();
+        let spec = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../dataset_spec"));
+        let read = |name: &str| std::fs::read_to_string(spec.join(name)).unwrap();
         let replaced = |text: &str, start: &str, end: &str, by: &str| {
-            let (head, rest) = text.split_once(start).unwrap_or_else(|| panic!("no '{start}' in PROTOCOL.md"));
+            let (head, rest) = text.split_once(start).unwrap_or_else(|| panic!("'{start}' is missing"));
             let (_, tail) = rest.split_once(end).unwrap();
             format!("{head}{by}{end}{tail}")
         };
-        let mut text = replaced(&before, "| Metric | Better", "\n\n", crate::metric::markdown().trim_end());
+        let (document, example) = ("PROTOCOL.md", "examples/result.json");
+        let mut text = replaced(&read(document), "| Metric | Better", "\n\n", crate::metric::markdown().trim_end());
         for name in Protocol::NAMES {
             let start = format!("| `{name}` | `");
             text = replaced(&text, &start, "` |", &format!("{start}{}", Protocol::named(name).unwrap().sha256()));
         }
-        if std::env::var_os("MATEVAL_WRITE_DOCS").is_some() {
-            std::fs::write(path, &text).unwrap();
-            return;
+        let protocol = mateval_dataset::json::to_text(&Protocol::named(Protocol::DEFAULT).unwrap());
+        let (start, end) = ("      \"protocol\": ", ",\n      \"fingerprint\"");
+        let protocol = format!("{start}{}", protocol.trim_end().replace('\n', "\n      "));
+        for (name, text) in [(document, text), (example, replaced(&read(example), start, end, &protocol))] {
+            if std::env::var_os("MATEVAL_WRITE_DOCS").is_some() {
+                std::fs::write(spec.join(name), text).unwrap();
+            } else {
+                assert!(text == read(name), "{name} is outdated; set MATEVAL_WRITE_DOCS=1 and run this test again");
+            }
         }
-        assert!(text == before, "PROTOCOL.md is not up to date; set MATEVAL_WRITE_DOCS=1 and run this test again");
     }
 
     #[test]
     fn rules_of_measured_colours_are_those_of_the_code() {
-        let mut protocol = Protocol::named(CAPTURE).unwrap();
+        let mut protocol = Protocol::named(Protocol::CAPTURE).unwrap();
         assert!(protocol.check().is_ok());
         protocol.measured = Some(MeasuredRules { maw_least: 0.5, ..MeasuredRules::OF_THIS_SCORER });
         assert!(protocol.check().unwrap_err().to_string().contains("states measured = MeasuredRules"));

@@ -55,6 +55,16 @@ pub struct ResultFile {
     pub findings: Vec<Finding>,
 }
 
+impl ResultFile {
+    /// The method's name with the geometry that it was given, as in `nn (pose 2)`.
+    pub fn shown_method(&self) -> String {
+        match &self.submission.geometry {
+            None => self.method.clone(),
+            Some(perturbation) => format!("{} ({perturbation})", self.method),
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionId {

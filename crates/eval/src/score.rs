@@ -597,13 +597,13 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
         });
     }
     if scored.iter().any(|scene| scene.photo.is_none()) {
-        let has_renders = |track: &Track| match track {
-            Track::Fitted => plan.dataset.file.photo_renderer.is_some(),
-            Track::True | Track::Relit => has_references(plan.dataset),
+        let has_renders = |track: &Track| match track.row().is_fitted {
+            true => plan.dataset.file.photo_renderer.is_some(),
+            false => has_references(plan.dataset),
         };
         let tracks = Track::ALL.iter().copied().filter(|track| plan.has(*track));
         missing.extend(tracks.filter(|track| !has_renders(track)).map(|track| MissingMetric {
-            metric: MissingNumbers::Picture(track.picture()),
+            metric: MissingNumbers::Picture(track.row().picture),
             reason: "the dataset has no renders to compare with".to_owned(),
             fix: "mateval prep render DATASET".to_owned(),
         }));

@@ -35,6 +35,8 @@ pub struct Competition {
     pub out: PathBuf,
     /// Name and tag of the image on Docker Hub.
     pub image: String,
+    /// The name of the protocol that the columns belong to.
+    pub protocol: String,
     pub columns: Vec<Column>,
     /// How long a scene takes to score, in seconds; without it all scenes are one task.
     pub seconds_a_scene: Option<u32>,
@@ -136,7 +138,8 @@ pub fn export(competition: &Competition, progress: Progress<'_>) -> Result<(usiz
 fn write_program(competition: &Competition, is_hidden: bool, out: &Path) -> Result<(), ExportError> {
     let numbers = if is_hidden { "rounded" } else { "whole" };
     let columns: String = competition.columns.iter().map(|column| format!("{}\n", column.key)).collect();
-    write_file(&out.join("metadata.yaml"), format!("command: sh /app/program/score.sh {numbers}\n").as_bytes())?;
+    let command = format!("command: sh /app/program/score.sh {numbers} {}\n", competition.protocol);
+    write_file(&out.join("metadata.yaml"), command.as_bytes())?;
     write_file(&out.join("score.sh"), SCORE.as_bytes())?;
     write_file(&out.join("columns.txt"), columns.as_bytes())
 }
@@ -208,9 +211,11 @@ fn overview(competition: &Competition, dataset: &Dataset) -> String {
         Some(url) => format!("Download the dataset from <{url}>."),
         None => "The organisers state where the dataset can be downloaded.".to_owned(),
     };
-    let numbers = match dataset.is_hidden() {
-        true => "Scores are rounded to 0.1 dB or to their error, since exact ones give the truth away.",
-        false => "The page of a submission shows all of its numbers, and its base colours beside the truth.",
+    let is_captured = dataset.scenes.iter().any(|scene| !scene.source.kind.states_materials());
+    let numbers = match (dataset.is_hidden(), is_captured) {
+        (true, _) => "Scores are rounded to 0.1 dB or to their error, since exact ones give the truth away.",
+        (false, true) => "The page of a submission shows all of its numbers.",
+        (false, false) => "The page of a submission shows all of its numbers, and its base colours beside the truth.",
     };
     format!(
         "# {}\n\nA method gets a photo of a room and its geometry, and returns a base colour for each object, with \

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Scores a submission on Codabench: score.sh rounded|whole [INPUT OUTPUT]
+# Scores a submission on Codabench: score.sh rounded|whole PROTOCOL [INPUT OUTPUT]
 #
 # In: the dataset with its truth and, of a hidden split, the floors of its numbers in INPUT/ref, the submission in INPUT/res,
 # the board's columns in columns.txt, the command mateval. Out: OUTPUT/scores.json, a number for each column, and OUTPUT/detailed_results.html, a page that loads
 # nothing. Of a hidden split (rounded) neither holds more than `eval score --rounded`, and nothing else is written.
 set -eu
 export LC_ALL=C
-numbers=$1 input=${2:-/app/input} output=${3:-/app/output}
+numbers=$1 protocol=$2 input=${3:-/app/input} output=${4:-/app/output}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -28,7 +28,7 @@ if [ "$numbers" = rounded ]; then
         set -- "$@" --floor "$floor"
     done
 fi
-mateval eval score "$submission" --dataset "$input/ref" --out "$work/whole.json" "$@" > /dev/null
+mateval eval score "$submission" --dataset "$input/ref" --protocol "$protocol" --out "$work/whole.json" "$@" > /dev/null
 
 # Both files have a number a line; the means over all scenes follow the word.
 case $numbers in
@@ -48,14 +48,16 @@ as_html() { sed 's/&/\&amp;/g; s/</\&lt;/g'; }
     echo '<style>body { font: 16px sans-serif; margin: 1em } pre { overflow: auto } img { max-width: 100% }</style>'
     echo '<h1>Scores</h1><pre>'
     if [ "$numbers" = whole ]; then
-        mateval eval tables "$work/whole.json" --format text | as_html
+        mateval eval tables "$work/whole.json" --protocol "$protocol" --format text > "$work/tables.txt"
+        as_html < "$work/tables.txt"
     else
         as_html < "$work/rounded.json"
     fi
     echo '</pre><h1>Findings about the submission</h1><pre>'
     as_html < "$work/lint.txt"
     echo '</pre>'
-    if [ "$numbers" = whole ]; then
+    # Of a captured room the true base colours are not known.
+    if [ "$numbers" = whole ] && [ "$protocol" != capture-1 ]; then
         echo '<h1>Base colours: the truth, then the submission</h1>'
         echo '<p>A row is a view. In novel views, what the photo shows is darkened. Black is not scored.</p>'
         mateval eval pictures "$submission" --dataset "$input/ref" --out "$work/pictures" > /dev/null

@@ -33,7 +33,7 @@ const MOST_OFF_WHITE: f32 = 0.05;
 const LARGEST_ENTRY: f64 = 4.0;
 /// Below it the primaries lie on a line, nearly.
 const LEAST_DETERMINANT: f64 = 0.01;
-const UNREADABLE: &str = "cannot be read; remove it from the file or save the photo as sRGB";
+pub(crate) const UNREADABLE: &str = "cannot be read; remove it from the file or save the photo as sRGB";
 
 /// The curves and primaries of a profile, unless they are those of sRGB.
 pub(crate) struct Profile {
@@ -65,7 +65,12 @@ impl Profile {
             if states_icc(bytes) {
                 return Err(unreadable());
             }
-            if let Some(space) = exif_color_space(&decoder.exif_metadata().ok().flatten().unwrap_or_default()) {
+            // A TIFF is EXIF data itself.
+            let exif = match bytes {
+                [b'I', b'I', ..] | [b'M', b'M', ..] => bytes.to_vec(),
+                _ => decoder.exif_metadata().ok().flatten().unwrap_or_default(),
+            };
+            if let Some(space) = exif_color_space(&exif) {
                 return Err(unsupported(format!(
                     "its EXIF data states {space}, and it has no colour profile; convert the photo to sRGB"
                 )));
@@ -255,6 +260,18 @@ fn states_icc(bytes: &[u8]) -> bool {
 
 /// Whether a JPEG holds a part of a colour profile: a segment APP2 of that name (ICC.1:2022, annex B.4).
 fn jpeg_states_icc(bytes: &[u8]) -> bool {
+    has_jpeg_segment(bytes, |marker, data| marker == 0xe2 && data.starts_with(b"ICC_PROFILE\0"))
+}
+
+/// Whether a JPEG has four components, which are amounts of ink: the start of its frame states their number behind
+/// precision, height and width (ITU-T T.81, B.2.2).
+pub(crate) fn is_cmyk_jpeg(bytes: &[u8]) -> bool {
+    let is_frame = |marker| matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc);
+    has_jpeg_segment(bytes, |marker, data| is_frame(marker) && data.get(5) == Some(&4))
+}
+
+/// Whether `is` holds for the marker and data of any segment before a JPEG's pixels.
+fn has_jpeg_segment(bytes: &[u8], is: impl Fn(u8, &[u8]) -> bool) -> bool {
     let mut rest = bytes.strip_prefix(b"\xff\xd8").unwrap_or_default();
     while let [0xff, marker, after @ ..] = rest {
         match marker {
@@ -266,7 +283,7 @@ fn jpeg_states_icc(bytes: &[u8]) -> bool {
                 let Some((length, _)) = after.split_first_chunk::<2>() else { return false };
                 let length = usize::from(u16::from_be_bytes(*length));
                 let Some(data) = after.get(2..length) else { return false };
-                if *marker == 0xe2 && data.starts_with(b"ICC_PROFILE\0") {
+                if is(*marker, data) {
                     return true;
                 }
                 rest = &after[length..];

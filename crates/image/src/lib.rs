@@ -1,7 +1,7 @@
 //! Pictures and textures whose types state their contents, and the files that hold them.
 //!
-//! In: PNG, JPEG, WebP, HDR, BMP, EXR and NumPy files, which are untrusted input, or pixels from the other crates. Out:
-//! typed pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for
+//! In: PNG, JPEG, WebP, HDR, BMP, EXR and NumPy files, and TIFF for photos, which are untrusted input, or pixels from the
+//! other crates. Out: typed pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for
 //! lookups ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
 //!
 //! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours

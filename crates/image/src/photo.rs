@@ -1,10 +1,12 @@
-//! Reads photos from untrusted PNG, JPEG, WebP, BMP, Radiance HDR and OpenEXR files.
+//! Reads photos from untrusted PNG, JPEG, WebP, TIFF, BMP, Radiance HDR and OpenEXR files.
 
 use std::path::Path;
 
-use crate::color_profile::{CHROMATICITY_TOLERANCE, Profile, REC709};
+use crate::color_profile::{CHROMATICITY_TOLERANCE, Profile, REC709, is_cmyk_jpeg};
 use crate::npy_io::NPY_SIGNATURE;
-use crate::texture_io::{Encoding, FewerBits, is_turned, texture_and_alpha_of_bytes, transparent_share};
+use crate::texture_io::{
+    CMYK, Encoding, FewerBits, is_turned, photo_of_tiff, texture_and_alpha_of_bytes, transparent_share,
+};
 use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
 
 /// A photo in linear light; alpha is dropped.
@@ -22,7 +24,7 @@ impl PhotoFile {
         let invalid = |what: String| ImageError::invalid(path, what);
         if bytes.starts_with(NPY_SIGNATURE) {
             let what =
-                "a NumPy array does not state whether it is sRGB or linear; expected PNG, JPEG, WebP, BMP, Radiance HDR or OpenEXR".to_owned();
+                "a NumPy array does not state whether it is sRGB or linear; expected PNG, JPEG, WebP, TIFF, BMP, Radiance HDR or OpenEXR".to_owned();
             return Err(ImageError::unsupported(path, what));
         }
         if is_turned(&bytes) {
@@ -33,7 +35,14 @@ impl PhotoFile {
             return Err(ImageError::Unsupported { path: path.to_owned(), what });
         }
         let profile = Profile::of(path, &bytes)?;
-        let (pixels, alpha) = texture_and_alpha_of_bytes(path, bytes, Encoding::Srgb, Wrap::Clamp)?;
+        if is_cmyk_jpeg(&bytes) {
+            return Err(ImageError::unsupported(path, CMYK));
+        }
+        let (pixels, alpha) = if [b"II*\0", b"MM\0*"].iter().any(|start| bytes.starts_with(*start)) {
+            photo_of_tiff(path, &bytes)?
+        } else {
+            texture_and_alpha_of_bytes(path, bytes, Encoding::Srgb, Wrap::Clamp)?
+        };
         if let Some(words) = FewerBits::of(&pixels) {
             let FewerBits { bits, largest } = words;
             return Err(invalid(format!(
@@ -41,6 +50,11 @@ impl PhotoFile {
                  multiply them by 65535 / {}",
                 words.full()
             )));
+        }
+        if profile.is_some() && matches!(pixels.texels(), Texels::Linear(_)) {
+            let what = "its floating-point numbers have a colour profile, which is not applied to them; save the photo in \
+                        linear Rec. 709 without a profile, or as 16-bit integers";
+            return Err(ImageError::unsupported(path, what));
         }
         let transparent = alpha.map_or(0.0, |alpha| transparent_share(&alpha));
         if let Some(pixels) = profile.and_then(|profile| converted(&pixels, &profile)).transpose()? {
@@ -176,6 +190,8 @@ fn covered(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
 
 #[cfg(test)]
 mod tests {
+    use tiff::encoder::{TiffValue, colortype};
+
     use super::*;
     use crate::{exr_io, png_io};
 
@@ -296,6 +312,62 @@ mod tests {
         }
         // Twins: integers of the whole range, and a dark photo.
         assert!(write(65528).is_ok() && write(6000).is_ok());
+    }
+
+    /// A TIFF of 3x1 pixels with another tag, or none.
+    fn tiff_of<C: colortype::ColorType>(pixels: &[C::Inner], tag: Option<(tiff::tags::Tag, u32)>) -> Vec<u8>
+    where
+        [C::Inner]: TiffValue,
+    {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut bytes).unwrap();
+        let mut picture = encoder.new_image::<C>(3, 1).unwrap();
+        if let Some((tag, value)) = tag {
+            picture.encoder().write_tag(tag, value).unwrap();
+        }
+        picture.write_data(pixels).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn a_tiff_has_the_values_of_a_png_and_a_cameras_raw_file_is_refused() {
+        use tiff::tags::Tag;
+        let read = |bytes| PhotoFile::of_bytes(Path::new("a.tif"), bytes);
+        let words = [0, 9000, 65535, 1, 2, 3, 40000, 30000, 20000];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        png_io::write_rgb_words(
+            &path,
+            &Picture::from_fn(3, 1, |x, _| [words[3 * x], words[3 * x + 1], words[3 * x + 2]]),
+        )
+        .unwrap();
+        let png = PhotoFile::of_bytes(&path, std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!(read(tiff_of::<colortype::RGB16>(&words, None)).unwrap(), png);
+        let floats = tiff_of::<colortype::RGB32Float>(&[0.5; 9], None);
+        assert_eq!(read(floats).unwrap().encoding(), Encoding::Linear);
+        for (tag, value) in [(Tag::SubIfd, 8), (Tag::Unknown(50706), 1), (Tag::NewSubfileType, 1)] {
+            let error = read(tiff_of::<colortype::RGB16>(&words, Some((tag, value)))).unwrap_err().to_string();
+            assert!(error.contains("raw file"), "{tag:?}: {error}");
+        }
+        let damaged = read(tiff_of::<colortype::RGB16>(&words, Some((Tag::IccProfile, 7)))).unwrap_err().to_string();
+        assert!(damaged.contains("colour profile"), "{damaged}");
+        let turned = tiff_of::<colortype::RGB16>(&words, Some((Tag::Orientation, 6)));
+        assert!(read(turned).unwrap_err().to_string().contains("stored upright"));
+        let ink = read(tiff_of::<colortype::CMYK8>(&[9; 12], None)).unwrap_err().to_string();
+        assert!(ink.contains("CMYK"), "{ink}");
+        let whole = tiff_of::<colortype::RGB16>(&words, None);
+        for length in 0..whole.len() {
+            assert!(read(whole[..length].to_vec()).is_err(), "{length} bytes");
+        }
+    }
+
+    /// Four components are CMYK. The twin has three.
+    #[test]
+    fn a_jpeg_in_ink_is_refused() {
+        let of = |components| [&b"\xff\xd8\xff\xc0\0\x14\x08\0\x08\0\x08"[..], &[components], &[0; 12]].concat();
+        assert!(is_cmyk_jpeg(&of(4)) && !is_cmyk_jpeg(&of(3)));
+        let error = PhotoFile::of_bytes(Path::new("a.jpg"), of(4)).unwrap_err().to_string();
+        assert!(error.contains("CMYK"), "{error}");
     }
 
     #[test]

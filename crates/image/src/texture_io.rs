@@ -5,11 +5,15 @@ use std::io::Cursor;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use image::codecs::tiff::TiffDecoder;
 use image::metadata::Orientation;
-use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
+use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageFormat, ImageReader};
 use mateval_files::FileError;
 use mateval_files::untrusted::hint;
+use tiff::decoder::Decoder;
+use tiff::tags::Tag;
 
+use crate::color_profile::UNREADABLE;
 use crate::exr_io::{self, EXR_SIGNATURE};
 use crate::limits::{check_size, read_file};
 use crate::npy_io::{self, NPY_SIGNATURE};
@@ -44,7 +48,54 @@ pub fn texture_and_alpha_of_bytes(
     if bytes.starts_with(NPY_SIGNATURE) {
         return Ok((npy_io::texture_of_npy(path, &bytes, encoding, wrap)?, None));
     }
-    let decoded = decode(path, bytes)?;
+    with_alpha(path, decode(path, bytes)?, encoding, wrap)
+}
+
+/// Reads a photo in sRGB, or in linear floating-point numbers, and its alpha channel from the bytes of a TIFF. Cameras'
+/// raw files are TIFF as well, whose first picture is a thumbnail: they are refused, as is every file of several pictures.
+pub(crate) fn photo_of_tiff(path: &Path, bytes: &[u8]) -> Result<(Texture, Option<Texture>), ImageError> {
+    const DNG_VERSION: Tag = Tag::Unknown(50706);
+    const COLOR_FILTERS: u32 = 32803;
+    const LINEAR_RAW: u32 = 34892;
+    let invalid = |error: &dyn std::fmt::Display| ImageError::invalid(path, format!("not a valid TIFF: {error}"));
+    let mut tags = Decoder::new(Cursor::new(bytes)).map_err(|error| invalid(&error))?;
+    let mut unsigned = |tag| tags.find_tag_unsigned::<u32>(tag).map_err(|error| invalid(&error));
+    let is_reduced = unsigned(Tag::NewSubfileType)?.is_some_and(|of| of & 1 == 1);
+    let photometric = unsigned(Tag::PhotometricInterpretation)?;
+    // A tag that cannot be read is stated, too.
+    let states = |tags: &mut Decoder<_>, tag| !matches!(tags.find_tag(tag), Ok(None));
+    if is_reduced
+        || tags.more_images()
+        || states(&mut tags, DNG_VERSION)
+        || states(&mut tags, Tag::SubIfd)
+        || photometric.is_some_and(|of| [COLOR_FILTERS, LINEAR_RAW].contains(&of))
+    {
+        let what = "a camera's raw file, or a TIFF of several pictures; develop it, and save it as PNG or as a TIFF of \
+                    one picture";
+        return Err(ImageError::unsupported(path, what.to_owned()));
+    }
+    let profile =
+        tags.find_tag(Tag::IccProfile).and_then(|value| value.map(tiff::decoder::ifd::Value::into_u8_vec).transpose());
+    if profile.is_err() {
+        return Err(ImageError::unsupported(path, format!("its colour profile {UNREADABLE}")));
+    }
+    let mut decoder = TiffDecoder::new(Cursor::new(bytes)).map_err(|error| invalid(&error))?;
+    // Those that `ImageReader` sets for other formats.
+    decoder.set_limits(image::Limits::default()).map_err(|error| invalid(&error))?;
+    if matches!(decoder.original_color_type(), ExtendedColorType::Cmyk8 | ExtendedColorType::Cmyk16) {
+        return Err(ImageError::unsupported(path, CMYK.to_owned()));
+    }
+    with_alpha(path, decoded(path, decoder)?, Encoding::Srgb, Wrap::Clamp)
+}
+
+pub(crate) const CMYK: &str = "its colours are CMYK, amounts of ink; convert the photo to sRGB";
+
+fn with_alpha(
+    path: &Path,
+    decoded: DynamicImage,
+    encoding: Encoding,
+    wrap: Wrap,
+) -> Result<(Texture, Option<Texture>), ImageError> {
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     let alpha = decoded.color().has_alpha().then(|| alpha_texels(&decoded));
     let texels = color_texels(path, decoded, encoding)?;
@@ -131,18 +182,24 @@ fn largest_word(values: &[f32]) -> Option<u16> {
 }
 
 fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
-    let invalid = |error: image::ImageError| ImageError::invalid(path, format!("not a valid picture: {error}"));
     let hint = hint(&bytes);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(FileError::io("read", path))?;
-    if !reader.format().is_some_and(|format| format.reading_enabled()) {
+    if !reader.format().is_some_and(|format| format.reading_enabled() && format != ImageFormat::Tiff) {
         let what =
             format!("not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy{hint}");
         return Err(ImageError::unsupported(path, what));
     }
-    let decoder = reader.into_decoder().map_err(invalid)?;
+    decoded(path, reader.into_decoder().map_err(|error| invalid_picture(path, error))?)
+}
+
+fn decoded(path: &Path, decoder: impl ImageDecoder) -> Result<DynamicImage, ImageError> {
     let (width, height) = decoder.dimensions();
     check_size(path, u64::from(width), u64::from(height))?;
-    DynamicImage::from_decoder(decoder).map_err(invalid)
+    DynamicImage::from_decoder(decoder).map_err(|error| invalid_picture(path, error))
+}
+
+fn invalid_picture(path: &Path, error: image::ImageError) -> ImageError {
+    ImageError::invalid(path, format!("not a valid picture: {error}"))
 }
 
 fn alpha_texels(decoded: &DynamicImage) -> Texels {

@@ -15,6 +15,7 @@ use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, MetricError, Net, Pixel, Psnr, mse, ssim_valid_windows};
 use mateval_report::tables::{Grouping, TableFormat};
 use mateval_submission::lint::{LintFile, LintPlan, lint as check, plain, refused};
+use mateval_submission::map_file::BASE_COLOR_RANGE;
 use mateval_submission::{SubmissionError, archive};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -176,6 +177,8 @@ impl Pair {
         let prediction = MapInput::new("prediction", prediction)?;
         let reference = MapInput::new("reference", reference)?;
         reference.check_same_kind(&prediction)?;
+        // The peak is 1, so floats of 0 to 255 are refused.
+        [&prediction, &reference].into_iter().try_for_each(|array| array.check_range(&BASE_COLOR_RANGE))?;
         match (prediction.colours_or_numbers()?, reference.colours_or_numbers()?) {
             (ColoursOrNumbers::Colours(a), ColoursOrNumbers::Colours(b)) => Ok(Self::Colours(a, b)),
             (ColoursOrNumbers::Numbers(a), ColoursOrNumbers::Numbers(b)) => Ok(Self::Numbers(a, b)),
@@ -184,8 +187,8 @@ impl Pair {
     }
 }
 
-/// The peak signal-to-noise ratio in dB, at most 100, of arrays of shape (height, width, 3) or (height, width) whose
-/// peak is 1. Values are compared as they are; uint8 and uint16 are divided by their largest value. The scorer compares
+/// The peak signal-to-noise ratio in dB, at most 100, of arrays of shape (height, width, 3) or (height, width). The peak
+/// is 1, and floats must lie from -1 to 16. Values are compared as they are; uint8 and uint16 are divided by their largest value. The scorer compares
 /// linear values of albedo. Where mask, (height, width) of bool, is given, only its pixels count; None where there are
 /// none.
 #[pyfunction]

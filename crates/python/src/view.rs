@@ -12,7 +12,7 @@ use numpy::ndarray::{ArrayD, Axis, IxDyn};
 use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _,
 };
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyFileNotFoundError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{plane, read_picture, rows, triples};
@@ -167,6 +167,13 @@ impl View {
             return Ok(Truth { source: Arc::clone(&self.source), at: self.at });
         }
         let shown = folder.display();
+        let root = &self.source.dataset.root;
+        if !root.is_dir() {
+            return Err(PyFileNotFoundError::new_err(format!(
+                "'{}' does not exist: the dataset was moved since it was opened; open it again at its new place",
+                root.display()
+            )));
+        }
         Err(withheld(format!("'{shown}' does not exist: the ground truth of this dataset is withheld")))
     }
 

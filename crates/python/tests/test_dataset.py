@@ -141,6 +141,14 @@ def test_withheld_truth_is_an_exception(withheld):
     assert issubclass(mateval.Withheld, mateval.Error)
 
 
+def test_a_dataset_that_was_moved_is_named(root, tmp_path):
+    shutil.copytree(root, tmp_path / "before")
+    view = mateval.open(tmp_path / "before")["room"].input
+    (tmp_path / "before").rename(tmp_path / "after")
+    with pytest.raises(FileNotFoundError, match="before' does not exist: the dataset was moved"):
+        view.truth
+
+
 def test_unknown_ids_name_the_known_ones(dataset, scene):
     with pytest.raises(mateval.UnknownId, match="has no scene 'hall'; it has 'room'") as caught:
         dataset["hall"]

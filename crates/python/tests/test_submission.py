@@ -304,9 +304,11 @@ def test_metrics_are_the_scorers(scene):
         mateval.metrics.ssim(a[:5, :5], b[:5, :5])
     with pytest.raises(TypeError, match="reference: expected floats like the prediction, found integers"):
         mateval.metrics.psnr(a, (b * 255).astype(np.uint8))
+    with pytest.raises(ValueError, match="reference: expected values from -1 to 16, found .*divide values of 0 to 255"):
+        mateval.metrics.psnr(a, b * 255)
     with pytest.raises(TypeError, match="mask: expected bool, found uint8"):
         mateval.metrics.psnr(a, b, mask.astype(np.uint8))
-    with pytest.raises(mateval.Error, match="has the value NaN at pixel"):
+    with pytest.raises(ValueError, match=r"prediction: expected values from -1 to 16, found NaN at \[0, 0\]"):
         mateval.metrics.ssim(np.full((20, 20), np.nan), np.zeros((20, 20)))
 
 
@@ -443,6 +445,8 @@ def test_a_scene_is_rendered_with_any_maps(scene, nn, scores):
     assert not np.array_equal(scene.render(nn, light="warm_cool", samples=1)["input"], ours["input"])
     with pytest.raises(ValueError, match="light: expected 'true', 'warm_cool'"):
         scene.render(nn, light="sun")
+    with pytest.raises(ValueError, match="expected base_color, roughness, metallic, found 'albedo'"):
+        scene.render({next(iter(maps)): {"albedo": np.zeros((64, 64, 3), np.uint8)}})
     with pytest.raises(ValueError, match="light: scene 'room' has no lighting 'alone_9'"):
         scene.render(nn, light="alone_9", samples=1)
 

@@ -13,8 +13,6 @@ use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
 use mateval_files::FileError;
 
-use crate::titles::shown_method;
-
 /// Why results could not be shown, or a dataset not be published or described.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
@@ -82,6 +80,15 @@ pub enum ReportError {
          --submission for each method, or --pictures, or leave out --votes"
     )]
     NothingToVoteOn,
+    /// Why results on the original rooms cannot be laid beside a board's.
+    #[error("the results of --original: {0}")]
+    Original(Box<Self>),
+    #[error(
+        "'{}' shows the truth of a hidden split, which everybody who opens the board would see: leave out --pictures, \
+         or add --with-ground-truth",
+        path.display()
+    )]
+    PictureOfHiddenTruth { path: PathBuf },
     #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,
     /// More than the bootstrap can draw from.
@@ -138,6 +145,11 @@ pub enum Mismatch {
          score both again with the same ones"
     )]
     Fingerprints { first: String, other: String },
+    #[error(
+        "the ceiling '{method}' is not the truth: expected 0 for '{key}', found {value:?}; score the submission of \
+         `mateval baseline gt` in its place"
+    )]
+    Ceiling { method: String, key: ResultKey, value: f64 },
     #[error("'{first}' and '{other}' were scored on different scenes; score both on the same scenes")]
     Scenes { first: String, other: String },
     #[error(
@@ -157,6 +169,22 @@ pub enum Mismatch {
     Changed { method: String, stated: String, found: String },
     #[error("the result of '{method}' holds {value:e} for '{key}', which is not a possible score; score it again")]
     ImpossibleScore { method: String, key: ResultKey, value: f64 },
+    #[error(
+        "the results of --original are on {dataset}, the board's own dataset; give results on the original rooms, \
+         whose materials are public, or leave --original out"
+    )]
+    SameDataset { dataset: DatasetVersion },
+    #[error(
+        "the results of --original were scored under different rules of protocol '{protocol}' (scorer version \
+         {original}, the board's: {board}); score both with one version"
+    )]
+    OtherRules { protocol: String, board: u32, original: u32 },
+    #[error(
+        "no method of the board ({}) has a result among those of --original ({}); methods are paired by the name in \
+         submission.json",
+        board.join(", "), original.join(", ")
+    )]
+    NoPair { board: Vec<String>, original: Vec<String> },
     #[error("the result has scorer version {found}, expected {SCORER_VERSION}; score it again")]
     Scorer { found: u32 },
     #[error(
@@ -241,7 +269,7 @@ impl Mismatch {
 
     /// The reason for which a result has no scores under a protocol, if it has none.
     pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
-        let method = shown_method(result);
+        let method = result.shown_method();
         let scored = || result.protocols.keys().cloned().collect();
         let is_scored = result.protocols.contains_key(protocol);
         (!is_scored).then(|| Self::Protocol { method, protocol: protocol.to_owned(), scored: scored() })

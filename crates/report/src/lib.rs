@@ -19,7 +19,6 @@ pub mod release;
 pub mod rounded;
 pub mod strips;
 pub mod tables;
-mod titles;
 pub mod votes;
 
 pub use error::ReportError;

@@ -19,7 +19,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Mismatch, ReportError};
-use crate::titles::shown_method;
 
 pub const ROUNDED_FORMAT: &str = "mateval-rounded/1";
 
@@ -69,14 +68,14 @@ impl RoundedFile {
         Ok(Self {
             format: ROUNDED_FORMAT.to_owned(),
             tool: result.tool.clone(),
-            method: shown_method(result),
+            method: result.shown_method(),
             submission_sha256: result.submission.sha256.clone(),
             dataset: result.dataset.named(),
             scenes: result.dataset.scenes.len(),
             houses: houses.len(),
             not_predicted: result.not_predicted.clone(),
             findings: result.findings.len(),
-            floors: floors.iter().map(shown_method).collect(),
+            floors: floors.iter().map(ResultFile::shown_method).collect(),
             headline,
             at_floor,
         })
@@ -89,7 +88,7 @@ pub fn check_floor<'a>(
     dataset: &Dataset,
     scenes: impl IntoIterator<Item = &'a SceneId>,
 ) -> Result<(), ReportError> {
-    let method = shown_method(floor);
+    let method = floor.shown_method();
     let missing: Vec<&SceneId> = scenes.into_iter().filter(|id| !floor.dataset.scenes.contains(id)).collect();
     let lacks = |first: &&SceneId| Mismatch::FloorScenes { method, missing: missing.len(), first: (*first).clone() };
     let mismatch = Mismatch::of_dataset(floor, dataset).or_else(|| missing.first().map(lacks));
@@ -99,7 +98,7 @@ pub fn check_floor<'a>(
 /// Why the numbers of a floor cannot be compared with those of a result. A floor may cover more scenes: those of the
 /// result are taken.
 fn unfit(result: &ResultFile, floor: &ResultFile) -> Option<Mismatch> {
-    let (first, other) = (shown_method(floor), shown_method(result));
+    let (first, other) = (floor.shown_method(), result.shown_method());
     let is_alike = |(name, scores): (&String, &ProtocolResult)| {
         floor.protocols.get(name).is_some_and(|of_floor| of_floor.protocol == scores.protocol)
     };

@@ -77,7 +77,7 @@ impl Shown {
     pub fn kind(self) -> PictureKind {
         match self {
             Self::Albedo => PictureKind::Albedo,
-            Self::Light { track, .. } => track.picture(),
+            Self::Light { track, .. } => track.row().picture,
         }
     }
 }

@@ -41,6 +41,9 @@ id = "room"
 bitterli = "room/scene.xml"
 "#;
 
+/// The licence of the house; the room's lies beside it.
+const LICENCE: &str = "licences = { front3d = \"CC0-1.0\" }\n";
+
 /// Writes the sample into the folder `out`, which is created if it is missing. Files of the same name are replaced.
 pub fn write(out: &Path) -> Result<(), SampleError> {
     write_at(out, RESOLUTION)
@@ -51,7 +54,7 @@ pub fn write_at(out: &Path, [width, height]: [u32; 2]) -> Result<(), SampleError
     write_room(out)?;
     house::write(out)?;
     // The recipe is written last, so that a folder with a recipe holds a complete sample.
-    let recipe = format!("name = \"sample\"\nresolution = [{width}, {height}]\n{SCENES}");
+    let recipe = format!("name = \"sample\"\nresolution = [{width}, {height}]\n{LICENCE}{SCENES}");
     write_text(&out.join("recipe.toml"), &recipe)
 }
 
@@ -62,7 +65,7 @@ const VARIED_ROOMS: [(&str, &str); 2] = [("living", "LivingDiningRoom-101"), ("b
 /// `seed` gives the same houses.
 pub fn write_houses(out: &Path, count: u32, seed: u64) -> Result<(), SampleError> {
     let [width, height] = RESOLUTION;
-    let mut recipe = format!("name = \"houses\"\nresolution = [{width}, {height}]\n");
+    let mut recipe = format!("name = \"houses\"\nresolution = [{width}, {height}]\n{LICENCE}");
     for (at, file) in house::write_variants(out, count, seed)?.into_iter().enumerate() {
         let (kind, room) = VARIED_ROOMS[at % VARIED_ROOMS.len()];
         recipe += &format!(

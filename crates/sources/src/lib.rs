@@ -14,8 +14,6 @@ pub mod bitterli;
 pub mod blend;
 pub mod capture;
 mod coincident;
-#[cfg(test)]
-mod fallback_tests;
 pub mod front3d;
 pub mod gltf;
 mod log;

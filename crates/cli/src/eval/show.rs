@@ -247,6 +247,7 @@ impl PicturesArgs {
 }
 
 #[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("pictured").args(["dataset", "pictures"]).multiple(true))]
 pub struct LeaderboardArgs {
     /// RESULT.json files. One is marked as verified if RESULT.verified.json lies beside it and a key that `--trust`
     /// names has signed it; all others are shown as claimed.
@@ -283,9 +284,15 @@ pub struct LeaderboardArgs {
     /// truth's pictures.
     #[arg(long)]
     pictures: Option<PathBuf>,
-    /// Show pictures of a hidden split, whose ground truth everybody can then see.
-    #[arg(long, requires = "dataset")]
+    /// Show pictures of a hidden split, drawn from --dataset or given by --pictures: everybody can then see its ground
+    /// truth.
+    #[arg(long, requires = "pictured")]
     with_ground_truth: bool,
+    /// Results of the methods on the original rooms, if the board's own rooms are redressed: a RESULT.json, or a folder
+    /// of results as `--from` takes it; may be given several times. Adds contamination.html, which shows how far each
+    /// method falls from rooms whose textures are public.
+    #[arg(long, value_name = "DIR|RESULT.json")]
+    original: Vec<PathBuf>,
     /// Add votes.html, on which people choose between pairs of pictures beside the truth; needs pictures of two methods.
     /// `mateval eval votes` counts the files that it saves.
     #[arg(long)]
@@ -333,9 +340,18 @@ impl LeaderboardArgs {
         let dataset = self.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
         dataset.iter().try_for_each(|dataset| dataset.check_may_be_shown(self.with_ground_truth))?;
         let opened = self.submissions.iter().map(|path| open_submission(path)).collect::<Result<Vec<_>, _>>()?;
-        if let Some(pictures) = self.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
-            bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
+        if let Some(pictures) = &self.pictures {
+            if !pictures.is_dir() {
+                bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
+            }
+            if !self.with_ground_truth {
+                leaderboard::check_may_be_shown(pictures, &entries.results)?;
+            }
         }
+        let original = match self.original.is_empty() {
+            true => None,
+            false => Some(entries::read_original(&self.original).context("cannot read --original")?),
+        };
         let plan = LeaderboardPlan {
             results: &entries.results,
             ceiling: entries.ceiling.as_ref(),
@@ -351,6 +367,7 @@ impl LeaderboardArgs {
                 shown: self.strips.shown_in_leaderboard(dataset),
             }),
             votes: self.votes,
+            original: original.as_deref(),
             tool: TOOL.to_owned(),
         };
         with_progress(|progress| leaderboard::write(&plan, &self.out, self.force, progress))

@@ -333,7 +333,7 @@ impl ExportArgs {
         for path in &self.competition.floors {
             check_floor(&ResultFile::read(path)?, &dataset, &dataset.file.scenes)?;
         }
-        let protocol = Protocol::named(Protocol::DEFAULT)?;
+        let protocol = protocol_of(&dataset.scenes)?;
         let column = |key: &ResultKey| {
             let style = &key.metric.row().style;
             Column {
@@ -349,6 +349,7 @@ impl ExportArgs {
             out: self.out.clone(),
             image: self.competition.image.clone().unwrap_or_default(),
             columns: protocol.headline.iter().map(column).collect(),
+            protocol: protocol.name,
             seconds_a_scene: self.competition.seconds_a_scene,
             limit: self.competition.limit.unwrap_or(600),
             url: self.url.clone(),
@@ -390,6 +391,20 @@ impl ExportArgs {
         };
         Ok(export_view(&dataset, scene, &self.view, samples, &self.out)?)
     }
+}
+
+/// The protocol that has values for all of the scenes: a competition has one table.
+fn protocol_of(scenes: &[SceneFile]) -> anyhow::Result<Protocol> {
+    for name in [Protocol::DEFAULT, Protocol::CAPTURE] {
+        let protocol = Protocol::named(name)?;
+        if scenes.iter().all(|scene| protocol.scores(scene)) {
+            return Ok(protocol);
+        }
+    }
+    bail!(
+        "the dataset holds captured and rendered scenes, which no protocol scores together; build a dataset and a \
+         competition of each"
+    )
 }
 
 /// Whoever gets the dataset cannot know what it may be used for.

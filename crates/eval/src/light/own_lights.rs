@@ -1,7 +1,7 @@
 //! Predictions under the scene's own emitters, compared with R.
 
 use mateval_dataset::Camera;
-use mateval_dataset::lighting::{LightingName, light_of, lightings, weighted};
+use mateval_dataset::lighting::{LightingName, light_of, weighted};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_tracer::emitter::group_shares::shares_for;
 use mateval_tracer::{LightMix, ViewsRender, World};
@@ -106,11 +106,10 @@ fn own_lightings(
         let what = format!("it has {} light groups, the scene has {groups}", group_light.len());
         return Err(EvalError::reference(task.dataset, task.scene, what));
     }
-    let blank = |track, name, mix| OwnLighting { track, name, mix, references: Vec::new() };
-    let mut all = vec![blank(Track::True, None, vec![[1.0; 3]; groups])];
-    if protocol.light.tracks.contains(&Track::Relit) {
-        let relit = lightings(&protocol.light.relit, &group_light);
-        all.extend(relit.into_iter().map(|relit| blank(Track::Relit, Some(relit.name), relit.weights)));
+    let mut all = Vec::new();
+    for &track in Track::ALL.iter().filter(|track| protocol.light.tracks.contains(track)) {
+        let of_track = protocol.light.lightings_of(track, &group_light).into_iter();
+        all.extend(of_track.map(|(name, mix)| OwnLighting { track, name, mix, references: Vec::new() }));
     }
     for view in &task.views {
         let groups = reference.groups(view)?;

@@ -104,7 +104,7 @@ impl<'a> LightMeter<'a> {
     }
 
     fn measure(&self, lit: &LitViews<'_>, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
-        let kind = lit.track.picture();
+        let kind = lit.track.row().picture;
         // Only the scene's own light is scored on specular surfaces.
         let is_wanted = |region: &&MaskedRegion| match region.surfaces {
             Surfaces::All => true,
@@ -122,22 +122,22 @@ impl<'a> LightMeter<'a> {
         }
         sheet.score.fit = lit.fit.clone().or(sheet.score.fit.take());
         sheet.score.not_finite += lit.not_finite;
-        if lit.track != Track::Relit {
+        if lit.track.row().is_shown {
             self.add_instance_errors(kind, &lit.views, sheet);
         }
         Ok(())
     }
 
-    /// Passes the views from the input view's place, relit ones excepted, to the plan's sink.
+    /// Passes the views from the input view's place to the plan's sink, where pages show the track.
     fn show(&self, submission: usize, lit: &LitViews<'_>) -> Result<(), EvalError> {
-        let is_shown = lit.track != Track::Relit && self.task.set == ViewSet::Turned;
+        let is_shown = lit.track.row().is_shown && self.task.set == ViewSet::Turned;
         let Some(seen) = self.task.seen.filter(|_| is_shown) else { return Ok(()) };
         for (at, view) in self.task.views.iter().enumerate() {
             seen(&SeenLight {
                 submission,
                 scene: &self.task.scene.id,
                 view: &view.id,
-                kind: lit.track.picture(),
+                kind: lit.track.row().picture,
                 valid: &self.truths[at].valid,
                 reference: &lit.references[at].encoded,
                 prediction: &lit.views[at].shown,

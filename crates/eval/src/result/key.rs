@@ -45,6 +45,13 @@ word_enum! {
 }
 
 impl Surfaces {
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::All => "All surfaces",
+            Self::Specular => "Specular regions",
+        }
+    }
+
     const fn suffix(self) -> &'static str {
         match self {
             Self::All => "",
@@ -54,6 +61,17 @@ impl Surfaces {
 }
 
 impl Views {
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Input => "Input view",
+            Self::Novel => "Novel views",
+            Self::Observed => "Observed",
+            Self::Unobserved => "Unobserved",
+            Self::Wide => "Wide views",
+            Self::WideUnobserved => "Unobserved in wide views",
+        }
+    }
+
     /// The views that a region of one view counts for.
     pub fn of(view: &ViewId, region: Region) -> Self {
         match region {

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
+use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::{bounds, submission};
@@ -465,6 +466,30 @@ fn baselines_run_on_captures_and_the_truth_is_refused() {
     assert!(by_estimate.unwrap_err().to_string().contains("is captured"));
 }
 
+/// A photo without its light is nearer to the measured colours than the photo, if the capture names its ceilings: these
+/// may glow then. The twin has no names; no ceiling of it may glow, and its base colours become too bright.
+#[test]
+fn the_delit_photo_beats_the_photo_where_ceilings_are_named() {
+    let (dataset, scene) = ordinary();
+    std::fs::copy(dataset.folder(&scene.id).instances(), SOURCE.join("named.glb")).unwrap();
+    let building = scene.instances.iter().filter(|instance| instance.role.is_architecture());
+    let building: Vec<&str> = building.map(|instance| instance.id.as_str()).collect();
+    let entries = entry("named", "transforms.json", &format!("architecture = {building:?}"))
+        + &entry("unnamed", "transforms.json", "");
+    let captures = built("capture_named", &entries.replace("mesh.ply", "named.glb")).unwrap();
+    let folder = kept_folder("capture_delit");
+    let delta_e = |name: &str, estimate: EstimateSource| -> [f64; 2] {
+        let out = folder.join(name);
+        nn::write(&captures, &out, false, &estimate, &NnOptions::default(), &|_| ()).unwrap();
+        let result = scored(&captures, &out, "capture-1");
+        let key = "measured.input.region_delta_e".parse().unwrap();
+        ["named", "unnamed"].map(|id| captured(&result).scenes[&SceneId::new(id).unwrap()][&key])
+    };
+    let [photo, _] = delta_e("photo", EstimateSource::Input);
+    let [named, unnamed] = delta_e("delight", EstimateSource::Delight(CandidateLights::Room));
+    assert!(named < 0.8 * photo && unnamed > photo, "photo {photo}, delight {named}, without names {unnamed}");
+}
+
 /// Scenes with the photos of all views: one with the id of the ordinary scene, and so with its seeds, and a distorted
 /// one.
 static WITH_NOVEL: LazyLock<Dataset> = LazyLock::new(|| {
@@ -584,6 +609,14 @@ fn captures_that_cannot_be_scored_are_refused_with_the_reason() {
     png_io::write_rgb_words(&SOURCE.join("fewer/image_0003.png"), &Picture::filled(32, 24, [30_000; 3])).unwrap();
     let thumbnail = fewer("transforms.json", "novel = [\"image_0003\"]");
     refused("capture_thumbnail", &thumbnail, "'fewer/image_0003.png' is 32x24, and its camera states 64x48");
+    // Cameras of FIPT state no size; the twin is a whole photo, in `every_format_of_cameras…`.
+    std::fs::create_dir_all(SOURCE.join("halves")).unwrap();
+    for number in 1..=6 {
+        let half = Picture::filled(32, 24, [30_000; 3]);
+        png_io::write_rgb_words(&SOURCE.join(format!("halves/image_000{number}.png")), &half).unwrap();
+    }
+    let halves = entry("a", "cam.txt", "").replace("\"images\"", "\"halves\"");
+    refused("capture_halves", &halves, "expected a point in the middle half");
     // A camera in another world than the mesh.
     write_posed("away.json", |camera| {
         Camera::from_rotation(camera.rotation(), camera.position() + DVec3::X * 1e4, camera.intrinsics)

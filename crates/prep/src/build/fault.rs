@@ -109,6 +109,12 @@ pub enum PhotoFault {
     )]
     OtherSize { file: String, found: [u32; 2], stated: [u32; 2] },
     #[error(
+        "'{file}' is {}x{}, and its camera's principal point {point:?}, in pixels: expected a point in the middle half; use \
+         the photo that the cameras were computed from, and no thumbnail or enlarged copy of it",
+        found[0], found[1]
+    )]
+    PrincipalPoint { file: String, found: [u32; 2], point: [f64; 2] },
+    #[error(
         "'{file}' cannot be undistorted over its whole picture: k1, k2, p1, p2 are {k:?}; undistort or crop it with the \
          program that computed its camera"
     )]

@@ -100,6 +100,12 @@ pub(super) fn read_captured(root: &Path, path: &str, lens: Lens) -> Result<(Capt
         return Err(PhotoFault::OtherSize { file, found, stated });
     }
     let [width, height] = found;
+    // Cameras without a size cannot show that the photo is a thumbnail. One of half the size puts the principal point at
+    // the edge; a crop seldom moves it by more than a quarter.
+    let is_off = |at: f64, size: u32| (at / f64::from(size) - 0.5).abs() > 0.25;
+    if stated == [0, 0] && (is_off(lens.cx, width) || is_off(lens.cy, height)) {
+        return Err(PhotoFault::PrincipalPoint { file, found, point: [lens.cx, lens.cy] });
+    }
     Ok((CapturedPhoto { file, photo, lens: Lens { width, height, ..lens } }, folder.into_files()))
 }
 

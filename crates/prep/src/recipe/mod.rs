@@ -467,6 +467,15 @@ mod tests {
         assert!(error.contains("resolutoin") && error.contains("line 2"), "{error}");
     }
 
+    /// Every kind refuses an integer by its type; an unknown key would be refused by its name.
+    #[test]
+    fn every_kind_of_source_is_a_key() {
+        for kind in SourceKind::ALL {
+            let error = recipe_of(&format!("name = 'x'\n[[scene]]\nid = 'a'\n{kind} = 7")).unwrap_err().to_string();
+            assert!(error.contains("invalid type: integer"), "{kind}: {error}");
+        }
+    }
+
     #[test]
     fn a_gltf_is_a_source() {
         let with = |words: &str| recipe_of(&format!("name = 'x'\n[[scene]]\nid = 'a'\ngltf = 'rooms/a.glb'\n{words}"));

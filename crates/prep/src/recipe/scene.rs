@@ -237,23 +237,27 @@ impl RecipeScene {
     /// The folder that the paths of the scene's files are relative to: the folder of the XML, glTF or .blend file, or
     /// else `source`, the folder that the recipe's paths are relative to.
     pub fn root(&self, source: &Path) -> PathBuf {
-        match self.main_file() {
-            Some(file) => source.join(file).parent().map(Path::to_owned).unwrap_or_default(),
+        match self.main_files().next() {
+            Some((_, file, _)) => source.join(file).parent().map(Path::to_owned).unwrap_or_default(),
             None => source.to_owned(),
         }
     }
 
-    /// The XML, glTF or .blend file, which names all other files of the scene.
-    fn main_file(&self) -> Option<&Path> {
-        self.bitterli.as_deref().or(self.gltf.as_deref()).or(self.blend.as_deref())
+    /// The main files that the scene names, an XML, glTF or .blend file: key, path, and the name of its folder in messages.
+    /// A valid scene has at most one.
+    fn main_files(&self) -> impl Iterator<Item = (&'static str, &Path, &'static str)> {
+        let all = [
+            ("bitterli", &self.bitterli, "the XML's folder"),
+            ("gltf", &self.gltf, "the glTF's folder"),
+            ("blend", &self.blend, "the .blend file's folder"),
+        ];
+        all.into_iter().filter_map(|(key, file, folder)| Some((key, file.as_deref()?, folder)))
     }
 
     /// The paths that the source needs, relative to the folder of the recipe's paths.
     pub(crate) fn source_paths(&self) -> Vec<SourcePath> {
         let path = |key, path: &Path, is_folder| SourcePath { key, path: path.to_owned(), is_folder };
-        let mut paths: Vec<SourcePath> = self.bitterli.iter().map(|xml| path("bitterli", xml, false)).collect();
-        paths.extend(self.gltf.iter().map(|gltf| path("gltf", gltf, false)));
-        paths.extend(self.blend.iter().map(|blend| path("blend", blend, false)));
+        let mut paths: Vec<SourcePath> = self.main_files().map(|(key, file, _)| path(key, file, false)).collect();
         if let Some(room) = &self.front3d {
             paths.push(path("house", &room.house, false));
             paths.push(path("models", &room.models, true));
@@ -345,12 +349,7 @@ impl RecipeScene {
 
     /// [`Self::root`], as messages name it.
     fn root_name(&self) -> &'static str {
-        match (&self.bitterli, &self.gltf, &self.blend) {
-            (Some(_), ..) => "the XML's folder",
-            (_, Some(_), _) => "the glTF's folder",
-            (.., Some(_)) => "the .blend file's folder",
-            _ => "the folder that the recipe's paths are relative to",
-        }
+        self.main_files().next().map_or("the folder that the recipe's paths are relative to", |(.., folder)| folder)
     }
 
     /// Twins need known light groups, ids, and each lighting once.

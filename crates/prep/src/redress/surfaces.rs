@@ -175,7 +175,11 @@ pub(super) fn class_of(origin: &InstanceOrigin, part: usize, name: &str, materia
     if let Some(classes) = &origin.class_of_part {
         // Of a part that consists of several classes the first is as good as any.
         let stated = classes.get(part).copied().flatten().or_else(|| classes.iter().copied().flatten().next());
-        return stated.unwrap_or(MaterialClass::Plastic);
+        let class = stated.unwrap_or(MaterialClass::Plastic);
+        // A single hard class covers the bed with its bedding, and the bedding is most of what shows.
+        let is_bed = origin.super_category.as_deref() == Some("Bed");
+        let is_all_hard = classes.iter().flatten().all(|class| is_hard(*class));
+        return if is_bed && is_all_hard && is_hard(class) { MaterialClass::Cloth } else { class };
     }
     let words = words_of(&[name, &material.name]);
     let usual = || THINGS.iter().find(|(_, things)| words.iter().any(|word| things.contains(&word.as_str())));
@@ -194,15 +198,18 @@ pub(super) fn class_of(origin: &InstanceOrigin, part: usize, name: &str, materia
         })
 }
 
+fn is_hard(class: MaterialClass) -> bool {
+    use MaterialClass as Is;
+    matches!(class, Is::Wood | Is::Board | Is::Stone | Is::Metal | Is::Wicker | Is::Tile)
+}
+
 /// Whether a part that is said to be of a hard class is green as leaves are: models state one class for a piece of
 /// furniture with all that stands on it.
 pub(super) fn is_leaf(class: MaterialClass, srgb: [f32; 3]) -> bool {
-    use MaterialClass as Is;
-    let is_hard = matches!(class, Is::Wood | Is::Board | Is::Stone | Is::Metal | Is::Wicker | Is::Tile);
     let [red, green, blue] = srgb.map(|value| f64::from(linear_from_srgb(value)));
     let color = Oklch::from_color_unclamped(LinSrgb::new(red, green, blue));
     let hue = color.hue.into_positive_degrees();
-    is_hard && color.chroma > 0.033 && color.l < 0.65 && (100.0..165.0).contains(&hue)
+    is_hard(class) && color.chroma > 0.033 && color.l < 0.65 && (100.0..165.0).contains(&hue)
 }
 
 /// The lower-case words of names, which are also divided where a capital follows a small letter.
@@ -247,6 +254,24 @@ mod tests {
             assert!(!is(class, wood) && !is(class, stone) && !is(class, shade), "{class}");
         }
         assert!(!is(MaterialClass::Lacquer, leaf) && !is(MaterialClass::Cloth, leaf));
+    }
+
+    /// A plywood bed had a blanket of wood.
+    #[test]
+    fn a_bed_is_of_cloth_if_the_model_states_a_hard_class() {
+        let material = Material::new("m", MaterialModel::grey(0.5));
+        let classes = |super_category: &str, stated: &[MaterialClass]| {
+            let origin = InstanceOrigin {
+                super_category: Some(super_category.to_owned()),
+                class_of_part: Some(stated.iter().copied().map(Some).collect()),
+                ..InstanceOrigin::default()
+            };
+            class_of(&origin, 0, "king-size-bed", &material)
+        };
+        assert_eq!(classes("Bed", &[MaterialClass::Wood]), MaterialClass::Cloth);
+        assert_eq!(classes("Bed", &[MaterialClass::Leather]), MaterialClass::Leather);
+        assert_eq!(classes("Bed", &[MaterialClass::Wood, MaterialClass::Cloth]), MaterialClass::Wood);
+        assert_eq!(classes("Table", &[MaterialClass::Wood]), MaterialClass::Wood);
     }
 
     #[test]

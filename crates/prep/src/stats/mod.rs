@@ -1,8 +1,8 @@
 //! Counts what a dataset contains: the numbers of the paper's Table I, and those behind them.
 //!
 //! In: an open dataset, but only its `dataset.json` and the `scene.json` of each scene. Out: [`StatsFile`], which
-//! [`show`] prints as tables and draws as a chart. [`look`](look::look) adds how the true albedo of input views looks;
-//! [`findings`](findings::findings) sums up the findings about the sources.
+//! [`show`] prints as tables and draws as a chart. [`look`](look::look) adds how the true albedo of input views looks,
+//! alone or beside another dataset's; [`findings`](findings::findings) sums up the findings about the sources.
 
 pub mod findings;
 pub mod look;
@@ -21,16 +21,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::PrepError;
-use look::LookStats;
+use look::{Beside, LookStats};
 
 /// The value of `format` in this version of the statistics.
-pub const STATS_FORMAT: &str = "mateval-stats/1";
+pub const STATS_FORMAT: &str = "mateval-stats/2";
 
 /// What `mateval prep stats --format json` prints: counts of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StatsFile {
-    /// Always `mateval-stats/1`.
+    /// Always `mateval-stats/2`.
     pub format: String,
     /// The program that counted and its version, as in `mateval 0.1.0`.
     pub tool: String,
@@ -53,6 +53,9 @@ pub struct StatsFile {
     /// How the true albedo looks; absent where the ground truth is withheld, and in reports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub look: Option<LookStats>,
+    /// The look of the dataset that `--beside` names; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside: Option<Beside>,
     /// Counts of all scenes together.
     pub total: Counts,
     /// Counts of each scene, in the dataset's order.
@@ -183,6 +186,7 @@ pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, PrepError> {
         super_categories_per_scene: spread(&per_scene, Counts::different_super_categories),
         categories_per_scene: spread(&per_scene, Counts::different_categories),
         look: None,
+        beside: None,
         total: counts(scenes),
         per_scene,
     })
@@ -534,6 +538,48 @@ mod tests {
         let mut changed = hand_made();
         changed.scenes[0].instances.pop();
         assert_ne!(picture(&stats), picture(&counted(&changed)));
+    }
+
+    /// The picture of two looks names both datasets and draws two outlines for each quantity.
+    #[test]
+    fn two_looks_are_drawn_side_by_side() {
+        let beside = |bin: usize| {
+            let of = |at: usize| {
+                let mut histogram = [0.0; 32];
+                histogram[at] = 1.0;
+                look::LookDistribution { mean: 0.0, deviation: 0.0, bin: 0.01, histogram }
+            };
+            let look = |at: usize| LookStats {
+                views: 2,
+                luminance: of(at),
+                lightness: of(3),
+                chroma: of(3),
+                local_contrast: of(3),
+                fine_share: of(3),
+                weak_area_share: None,
+            };
+            let [luminance, same] = [0.01 * bin.abs_diff(3) as f64, 0.0].map(Some);
+            let distance =
+                look::LookDistance { luminance, lightness: same, chroma: same, local_contrast: same, fine_share: same };
+            let dataset = DatasetVersion { name: "before".to_owned(), version: "2.0".to_owned(), ..Default::default() };
+            let mut stats = counted(&hand_made());
+            (stats.look, stats.beside) = (Some(look(3)), Some(Beside { dataset, look: look(bin), distance }));
+            stats
+        };
+        let svg = picture(&beside(8));
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let texts: Vec<&str> = document.descendants().filter_map(|node| node.text()).collect();
+        for expected in ["hand-made 1.0", "before 2.0 (original)", "distance 0.050", "0.32"] {
+            assert!(texts.contains(&expected), "{expected} not in {texts:?}");
+        }
+        let paths: Vec<&str> = document.descendants().filter_map(|node| node.attribute("d")).collect();
+        // Both samples of the legend, then two outlines for each of five quantities.
+        assert_eq!(paths.len(), 2 + 2 * 5);
+        assert!(paths[2] != paths[3] && paths[4] == paths[5], "{paths:?}");
+        assert!(text(&beside(8), None).contains("True albedo of 2 input views, beside 2 of before 2.0"));
+        // The twin: the same look.
+        assert_ne!(svg, picture(&beside(3)));
+        assert!(picture(&beside(3)).contains("distance 0.000"));
     }
 
     /// A hostile name adds no element, no script and no line.

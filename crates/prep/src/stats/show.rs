@@ -1,18 +1,21 @@
 //! Shows the counts: as tables, and as an SVG chart with one bar per category, grouped by super-category, and a
-//! histogram of the number of objects per scene. Numbers are rounded here; the JSON has all digits.
+//! histogram of the number of objects per scene; or, for two datasets, with the histograms of both looks. Numbers are
+//! rounded here; the JSON has all digits.
 //!
 //! Positions and texts of the chart are computed here; the template `picture.j2` turns them into markup and escapes
 //! every name. The same counts give the same bytes.
 
 use mateval_dataset::Severity;
-use mateval_dataset::dataset::SUPER_CATEGORIES;
+use mateval_dataset::dataset::{DatasetVersion, SUPER_CATEGORIES};
+use mateval_dataset::ids::counted;
 use mateval_dataset::progress::{Table, row};
 use mateval_files::untrusted::shown;
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use super::{CategoryCount, Counts, SceneStats, Spread, StatsFile, SuperCategoryCount, look};
+use super::look::{self, Beside, LookStats, Pair};
+use super::{CategoryCount, Counts, SceneStats, Spread, StatsFile, SuperCategoryCount};
 
 /// Length of the longest name that is printed in full, in characters.
 const LONGEST_CELL: usize = 60;
@@ -22,8 +25,8 @@ const HEADS: [&str; 8] = ["cabinet", "sofa", "lighting", "chair", "others", "bed
 
 /// All tables, for a terminal of `columns`; of any width if absent. Table I comes first, with the paper's headings.
 pub fn text(stats: &StatsFile, columns: Option<usize>) -> String {
-    let look = stats.look.iter().map(look::table);
-    let tables = [table_one(stats), beside(stats)].into_iter().chain(look).chain([
+    let look = stats.look.iter().map(|look| look::table(look, stats.beside.as_ref()));
+    let tables = [table_one(stats), further_counts(stats)].into_iter().chain(look).chain([
         super_categories(&stats.total),
         categories(&stats.total),
         findings(&stats.total),
@@ -51,7 +54,7 @@ fn spread_row(name: &str, spread: Option<Spread>) -> Vec<String> {
     }
 }
 
-fn beside(stats: &StatsFile) -> Table {
+fn further_counts(stats: &StatsFile) -> Table {
     let total = &stats.total;
     let mut rows = vec![row(["", "", "min", "max", "scenes"]), row(["houses", &stats.houses.to_string()])];
     let kinds = stats.source_kinds.iter();
@@ -186,14 +189,16 @@ struct Drawing {
     subtitle: String,
     rows: Vec<Row>,
     columns: Vec<Column>,
-    /// Position of the histogram's axis; absent if there is no histogram.
-    axis_y: Option<String>,
+    /// Positions of the axes of histograms.
+    axes: Vec<String>,
+    lines: Vec<Line>,
 }
 
 /// A line of text, with a bar beneath it where it shows a category.
 #[derive(Serialize)]
 struct Row {
     class: &'static str,
+    x: String,
     y: String,
     name: String,
     value: String,
@@ -220,9 +225,20 @@ struct Column {
     value: String,
 }
 
-/// The chart as SVG. It has its own background, light or dark as the reader's system prefers.
+/// A histogram's outline, or its sample in the legend.
+#[derive(Serialize)]
+struct Line {
+    class: &'static str,
+    path: String,
+}
+
+/// The chart as SVG: of both looks if the counts have another dataset's beside their own. It has its own background,
+/// light or dark as the reader's system prefers.
 pub fn picture(stats: &StatsFile) -> String {
-    let drawing = drawing(stats);
+    let drawing = match (&stats.look, &stats.beside) {
+        (Some(look), Some(beside)) => drawing_of_looks(&stats.dataset, look, beside),
+        _ => drawing(stats),
+    };
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     // The extension `.xml` turns escaping on.
@@ -241,19 +257,74 @@ fn drawing(stats: &StatsFile) -> Drawing {
     let known = stats.per_scene.iter().filter(|scene| scene.knows_its_objects());
     let objects: Vec<usize> = known.map(|scene| scene.counts.objects).collect();
     let axis_y = (!objects.is_empty()).then_some(y + 32.0 + COLUMNS_HEIGHT);
-    let [name, version] = [&stats.dataset.name, &stats.dataset.version].map(|word| shown(word, LONGEST_LABEL / 2));
     Drawing {
         width: number(WIDTH),
         height: number(axis_y.map_or(y, |axis_y| axis_y + 18.0) + MARGIN),
         left: number(MARGIN),
         right: number(WIDTH - MARGIN),
         inner: number(INNER),
-        title: format!("{name} {version}"),
+        title: label(&stats.dataset),
         subtitle: subtitle(stats),
         rows,
         columns: axis_y.map_or_else(Vec::new, |axis_y| columns(&objects, axis_y)),
-        axis_y: axis_y.map(number),
+        axes: axis_y.map(number).into_iter().collect(),
+        lines: Vec::new(),
     }
+}
+
+/// A dataset's name and version.
+fn label(dataset: &DatasetVersion) -> String {
+    let [name, version] = [&dataset.name, &dataset.version].map(|word| shown(word, LONGEST_LABEL / 2));
+    format!("{name} {version}")
+}
+
+/// One panel per quantity, with the histograms of both datasets as outlines of one scale.
+fn drawing_of_looks(dataset: &DatasetVersion, look: &LookStats, beside: &Beside) -> Drawing {
+    let mut y = 60.0;
+    let (mut rows, mut lines, mut axes) = (Vec::new(), Vec::new(), Vec::new());
+    for (class, name) in [("own", label(dataset)), ("other", label(&beside.dataset) + " (original)")] {
+        y += 20.0;
+        lines.push(Line { class, path: format!("M{} {}h24", number(MARGIN), number(y - 4.0)) });
+        rows.push(Row { x: number(MARGIN + 32.0), ..text_row("name", y, &name, String::new()) });
+    }
+    for Pair { name, own, other, distance } in look.pairs(&beside.look) {
+        y += GROUP;
+        let distance = distance.map_or_else(|| "no values".to_owned(), |distance| format!("distance {distance:.3}"));
+        rows.push(text_row("group", y, name, distance));
+        y += COLUMNS_HEIGHT + 12.0;
+        axes.push(number(y));
+        let most = own.histogram.iter().chain(&other.histogram).copied().fold(f64::MIN_POSITIVE, f64::max);
+        for (class, histogram) in [("own", &own.histogram), ("other", &other.histogram)] {
+            lines.push(Line { class, path: outline(histogram, most, y) });
+        }
+        y += 16.0;
+        rows.push(text_row("quiet", y, "0", (own.bin * own.histogram.len() as f64).to_string()));
+    }
+    let views = counted(look.views, "input view");
+    Drawing {
+        width: number(WIDTH),
+        height: number(y + MARGIN),
+        left: number(MARGIN),
+        right: number(WIDTH - MARGIN),
+        inner: number(INNER),
+        title: "True albedo, side by side".to_owned(),
+        subtitle: format!("{views} and {} of the original; heights are shares", beside.look.views),
+        rows,
+        columns: Vec::new(),
+        axes,
+        lines,
+    }
+}
+
+/// The steps of a histogram that stands on `axis_y`; the share `most` has the full height.
+fn outline(histogram: &[f64], most: f64, axis_y: f64) -> String {
+    let pitch = INNER / histogram.len() as f64;
+    let steps = histogram.iter().enumerate().map(|(at, share)| {
+        let [x, y] = [MARGIN + pitch * (at + 1) as f64, axis_y - COLUMNS_HEIGHT * share / most].map(number);
+        format!("V{y}H{x}")
+    });
+    let [x, y] = [MARGIN, axis_y].map(number);
+    format!("M{x} {y}{}V{y}", steps.collect::<String>())
 }
 
 fn subtitle(stats: &StatsFile) -> String {
@@ -320,7 +391,7 @@ fn group_value(group: &SuperCategoryCount) -> String {
 }
 
 fn text_row(class: &'static str, y: f64, name: &str, value: String) -> Row {
-    Row { class, y: number(y), name: name.to_owned(), value, bar: None }
+    Row { class, x: number(MARGIN), y: number(y), name: name.to_owned(), value, bar: None }
 }
 
 fn bar_row(y: f64, category: &CategoryCount, most: usize) -> Row {

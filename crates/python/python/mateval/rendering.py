@@ -33,7 +33,11 @@ def render(
         out = os.path.join(folder, "maps")
         with _core.Submission(out, root, method="maps") as submission:
             for instance, found in maps.items():
-                get = found.get if isinstance(found, Mapping) else lambda name: getattr(found, name)
+                is_mapping = isinstance(found, Mapping)
+                unknown = [name for name in found if name not in MAPS] if is_mapping else []
+                if unknown:
+                    raise ValueError(f"maps: {instance}: expected {', '.join(MAPS)}, found {', '.join(map(repr, unknown))}")
+                get = found.get if is_mapping else lambda name: getattr(found, name)
                 given = {name: get(name) for name in MAPS if get(name) is not None}
                 if given:
                     submission.write(scene.id, instance, **given)

@@ -11,7 +11,6 @@ use mateval_eval::result::key::Views;
 use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
 use super::scores::{LIGHTS, WORST};
 use crate::strips::WHITE_ERROR;
-use crate::titles::Titled;
 
 /// A picture of one of the worst instances.
 pub(super) struct Crop {

@@ -15,7 +15,6 @@ use super::rooms::{Room, Rooms};
 use super::site::SiteWriter;
 use crate::error::{Mismatch, ReportError};
 use crate::ranking::file::{RankedMethod, Ranking};
-use crate::titles::Titled;
 
 /// Everything that pages are made from. Results, scores and heads are in the order of the ranking's methods.
 pub(super) struct Board<'a> {

@@ -10,7 +10,6 @@ use serde::Serialize;
 use super::file::LeaderboardMethod;
 use super::marks::Verified;
 use crate::ranking::file::{RankRange, RankedMethod, Ranking, Standing};
-use crate::titles::Titled;
 
 #[derive(Clone, Serialize)]
 pub(super) struct Column {
@@ -80,10 +79,15 @@ impl Column {
 }
 
 fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
-    matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue | PictureKind::RgbFitted)
-        && matches!(views, Views::Input | Views::Novel)
-        && metric == Metric::Psnr
-        && picture.surfaces == Surfaces::All
+    let is_first = match picture.kind {
+        PictureKind::Albedo | PictureKind::RgbTrue | PictureKind::RgbFitted => {
+            matches!(views, Views::Input | Views::Novel)
+        }
+        // Beside the headline, in which a wrong tint hides how much of the texture a method has right.
+        PictureKind::AlbedoAligned => views == Views::Novel,
+        _ => false,
+    };
+    is_first && metric == Metric::Psnr && picture.surfaces == Surfaces::All
 }
 
 /// Every key of the ranking, in the order of surfaces, pictures, views and metrics.
@@ -96,7 +100,7 @@ pub(super) fn columns(ranking: &Ranking) -> Vec<Column> {
     columns
 }
 
-/// The columns that are shown initially, four at most: pages of methods open with them.
+/// The columns that are shown initially, five at most: pages of methods open with them.
 pub(super) fn shown(columns: &[Column]) -> Vec<&Column> {
     columns.iter().filter(|column| column.is_shown).collect()
 }
@@ -210,7 +214,7 @@ fn cost(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
     Some(Fact { value, text: seconds(cost.seconds_a_scene), note: shortened(&cost.hardware) })
 }
 
-fn trained_on(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
+pub(super) fn trained_on(method: &LeaderboardMethod, _: &ProtocolResult) -> Option<Fact> {
     if method.trained_on.is_empty() {
         return None;
     }

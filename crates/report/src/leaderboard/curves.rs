@@ -21,7 +21,6 @@ use super::entries::is_in_curves;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::tables::ConstancyMeans;
-use crate::titles::Titled;
 
 /// Classes of the share of pixels that the input view does not show.
 const SHARES: u32 = 5;

@@ -8,9 +8,7 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{DatasetError, Finding, SceneId, Severity, json};
-use mateval_eval::metric::Metric;
-use mateval_eval::protocol::Track;
-use mateval_eval::result::key::{Region, ResultKey, Surfaces};
+use mateval_eval::result::key::{Region, Surfaces};
 use mateval_eval::result::{PictureValues, ResultFile};
 use mateval_files::FileError;
 use mateval_files::untrusted::{nearest, read_at_most, shortened};
@@ -19,10 +17,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::marks::{TrustedKeys, Verified, sidecar};
-use crate::error::{ReportError, fitting};
+use crate::error::{Mismatch, ReportError, fitting};
 use crate::ranking::file::Ranking;
+use crate::ranking::inexact_light;
 use crate::strips::Shown;
-use crate::titles::shown_method;
 
 /// The file of the truth's own result.
 const CEILING: &str = "ceiling.json";
@@ -163,7 +161,7 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
         entries.about = Some(String::from_utf8_lossy(&bytes).into_owned());
     }
     let results = &entries.results;
-    let shown: Vec<String> = results.iter().map(shown_method).collect();
+    let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
     let names = shown.iter().map(|name| name.trim());
     findings.extend(repeated(&paths, names, "name", "/method", "give each method its own name, or leave one out"));
     if let (Some(errata), Some(path)) = (&entries.errata, &files.errata) {
@@ -173,6 +171,19 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
     let action = "a submission is ranked once: leave one out";
     findings.extend(repeated(&paths, hashes, "submission", "/submission/sha256", action));
     if findings.is_empty() { Ok(entries) } else { Err(ReportError::UnfitFiles(findings)) }
+}
+
+/// The results of methods on the original rooms of a redressed board: files, and folders as [`ResultsFolder::list`]
+/// finds them. Fails as [`read`] does.
+pub fn read_original(paths: &[PathBuf]) -> Result<Vec<ResultFile>, ReportError> {
+    let mut files = ResultsFolder::default();
+    for path in paths {
+        match path.is_dir() {
+            true => files.results.extend(ResultsFolder::list(path)?.results),
+            false => files.results.push(path.clone()),
+        }
+    }
+    Ok(read(&files, &TrustedKeys::default())?.results)
 }
 
 /// What a site is made from, and what it shows.
@@ -196,6 +207,8 @@ pub struct LeaderboardPlan<'a> {
     pub submissions: Option<Submissions<'a>>,
     /// Whether the site has a page on which people vote on its pictures.
     pub votes: bool,
+    /// Results on the original rooms, where the board's own are redressed: the site shows how far methods fall.
+    pub original: Option<&'a [ResultFile]>,
     pub tool: String,
 }
 
@@ -247,18 +260,12 @@ impl ErrataFile {
     }
 }
 
-/// Why a result cannot be the ceiling. Renders of the truth's own maps are equal to the reference in every bit.
+/// Why a result cannot be the ceiling.
 fn not_the_truth(path: &Path, result: &ResultFile, trust: &TrustedKeys) -> Option<Finding> {
     let action = "score the submission of `mateval baseline gt`, or leave the ceiling out";
-    let is_inexact =
-        |(key, value): (&ResultKey, &f64)| key.metric == Metric::Mse && key.picture.kind.is_light() && *value != 0.0;
-    let inexact = result.protocols.iter().find_map(|(name, scores)| {
-        // The light of `paper` is fitted to the photo, which another program may have rendered.
-        let is_exact = scores.protocol.light.tracks.contains(&Track::True);
-        scores.summary.iter().find(|entry| is_exact && is_inexact(*entry)).map(|(key, value)| (name, key, value))
-    });
-    if let Some((name, key, value)) = inexact {
-        let message = format!("this is not the truth: the ceiling's {key} is 0, found {value:?}");
+    let inexact = result.protocols.iter().find_map(|(name, scores)| Some((name, inexact_light(scores)?)));
+    if let Some((name, (key, value))) = inexact {
+        let message = Mismatch::Ceiling { method: result.shown_method(), key: *key, value }.to_string();
         return Some(error("not_the_truth", path, &format!("/protocols/{name}/summary/{key}"), message, action));
     }
     let is_signed = || trust.mark(path, result).is_ok_and(|mark| mark == Verified::Confirmed);
@@ -272,7 +279,7 @@ fn not_the_truth(path: &Path, result: &ResultFile, trust: &TrustedKeys) -> Optio
 
 /// A finding for each name in the errata that no result has: of no method, and of no scene.
 fn unknown_names(path: &Path, errata: &ErrataFile, results: &[ResultFile]) -> Vec<Finding> {
-    let methods: Vec<String> = results.iter().map(shown_method).collect();
+    let methods: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
     let scenes = results.iter().flat_map(|result| &result.dataset.scenes).map(SceneId::as_str);
     let known: BTreeSet<&str> = methods.iter().map(String::as_str).chain(scenes).collect();
     let mut findings = Vec::new();

@@ -18,7 +18,6 @@ use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::ranking::file::Pair;
 use crate::tables::{CellKey, Grouping, Value, pooled};
-use crate::titles::Titled;
 
 /// The numbers of worst scenes and instances that are shown.
 const WORST_SCENES: usize = 5;

@@ -34,8 +34,8 @@ use mateval_files::work_folder::{WorkFolder, check_free};
 use self::board::Board;
 pub use self::entries::{LeaderboardPlan, Submissions};
 use self::file::LEADERBOARD_PATH;
-pub use self::pictures::keep_seen;
-use self::site::{CONSTANCY, PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
+pub use self::pictures::{check_may_be_shown, keep_seen};
+use self::site::{CONSTANCY, CONTAMINATION, PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
@@ -43,6 +43,7 @@ use crate::ranking::rank;
 /// `force`, and never replaces anything else.
 pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Progress<'_>) -> Result<(), ReportError> {
     check_place(out, force)?;
+    let falls = robustness::falls(plan)?;
     progress(Report::step("ranking", 0, 1));
     let ranking = rank(plan.results, plan.protocol, plan.partial)?;
     let ceiling = plan.ceiling.map(|result| board::ceiling(result, &ranking)).transpose()?;
@@ -54,7 +55,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     let pictures = pictures::gather(plan, &named, &ranking, &work.path().join("pictures"), progress)?;
     let rooms = rooms::write(plan, &named, &ranking, &work.path().join("rooms"), progress)?;
     let board = Board::new(plan, ranking, ceiling, pictures, rooms);
-    let site = SiteWriter::new(work.path(), site(&board, plan.votes));
+    let site = SiteWriter::new(work.path(), site(&board, plan));
     site.assets()?;
     board_page::write_downloads(&board, plan.protocol, &site)?;
     board_page::write(&board, &site)?;
@@ -73,6 +74,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     curves::write_perturbed(&board, &site)?;
     curves::write_constancy(&board, &site)?;
     robustness::write(&board, &site)?;
+    robustness::write_contamination(&board, falls.as_ref(), &site)?;
     if plan.votes {
         votes_page::write(&board, &site)?;
     }
@@ -90,7 +92,7 @@ fn check_place(out: &Path, force: bool) -> Result<(), ReportError> {
     Ok(check_free(out, force, "--out")?)
 }
 
-fn site(board: &Board<'_>, votes: bool) -> Site {
+fn site(board: &Board<'_>, plan: &LeaderboardPlan<'_>) -> Site {
     let (dataset, ranking) = (&board.file.dataset, board.ranking());
     Site {
         title: format!("{} {} leaderboard", dataset.name, dataset.version),
@@ -108,7 +110,8 @@ fn site(board: &Board<'_>, votes: bool) -> Site {
             .chain(curves::has_perturbed(board).then_some(PERTURBED))
             .chain(curves::has_constancy(board).then_some(CONSTANCY))
             .chain(robustness::has_page(board).then_some(ROBUSTNESS))
-            .chain(votes.then_some(VOTES))
+            .chain(plan.original.map(|_| CONTAMINATION))
+            .chain(plan.votes.then_some(VOTES))
             .collect(),
     }
 }
@@ -117,8 +120,9 @@ fn site(board: &Board<'_>, votes: bool) -> Site {
 mod tests {
     //! A small site of invented results; tests in a browser are in `tests/site`.
 
-    use mateval_dataset::json;
     use mateval_dataset::submission::Cost;
+    use mateval_dataset::{SceneId, json};
+    use mateval_eval::protocol::SCORER_VERSION;
     use mateval_eval::result::{Constancy, Deviation};
     use mateval_eval::result::{ResultFile, TracerCheck};
     use mateval_image::{Picture, png_io};
@@ -149,6 +153,7 @@ mod tests {
             pictures: None,
             submissions: None,
             votes: false,
+            original: None,
             tool: "mateval".to_owned(),
         }
     }
@@ -279,6 +284,110 @@ mod tests {
         assert_eq!((page.matches("r=\"3\"").count(), page.matches("<tr><th scope=\"row\"").count()), (4, 6), "{page}");
         assert!(page.contains("0.125") && page.contains("1 scene is shown again"), "{page}");
         assert!(index.contains("constancy.html") && tables.contains("Constancy"), "{tables}");
+    }
+
+    /// The results of methods with these PSNR of albedo in novel views, raw and aligned, on the dataset with this
+    /// manifest; scenes differ by up to 2 dB.
+    fn redressed(manifest: &str, methods: &[(&str, [f64; 2])]) -> Vec<ResultFile> {
+        let of_method = |(name, psnr): &(&str, [f64; 2])| {
+            let mut result = result(name, &scores(20.0, 0.1));
+            let protocol = result.protocols.get_mut("mateval-3").unwrap();
+            for (at, values) in protocol.scenes.values_mut().enumerate() {
+                values.extend(robustness::FALLS.into_iter().zip(psnr.map(|psnr| psnr + (at % 3) as f64)));
+            }
+            result.dataset.manifest_sha256 = manifest.to_owned();
+            scored_anew(&mut result, SCORER_VERSION);
+            result
+        };
+        methods.iter().map(of_method).collect()
+    }
+
+    fn scored_anew(result: &mut ResultFile, scorer_version: u32) {
+        let ids: Vec<&SceneId> = result.dataset.scenes.iter().collect();
+        let scores = result.protocols.get_mut("mateval-3").unwrap();
+        scores.protocol.scorer_version = scorer_version;
+        scores.fingerprint = scores.protocol.fingerprint(&result.dataset.manifest_sha256, &ids, None);
+    }
+
+    /// One method is made to fall in both numbers. Another one falls further in the raw number alone: its tint changed.
+    #[test]
+    fn the_method_that_falls_from_public_textures_is_named_first() {
+        let folder = tempfile::tempdir().unwrap();
+        let original =
+            redressed("o", &[("tinted", [44.0, 27.0]), ("contaminated", [40.0, 41.0]), ("gone", [20.0, 20.0])]);
+        let mut results =
+            redressed("r", &[("tinted", [24.5, 26.25]), ("contaminated", [22.0, 23.0]), ("new", [30.0, 30.0])]);
+        results[1].submission.trained_on = vec!["3D-FRONT".to_owned()];
+        let out = folder.path().join("with");
+        let text = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+        write(&LeaderboardPlan { original: Some(&original), ..plan(&results) }, &out, false, &quiet).unwrap();
+        let page = text("contamination.html");
+        let [first, second] = ["contaminated", "tinted"].map(|id| page.find(&format!("methods/{id}.html")).unwrap());
+        assert!(first < second && page.contains("3D-FRONT"), "{page}");
+        for fall in ["18.00", "19.50", "0.75"] {
+            assert_eq!(page.matches(&format!("<td><b>{fall}</b></td>")).count(), if fall == "18.00" { 2 } else { 1 });
+        }
+        assert!(page.contains("on the original rooms: new.") && page.contains("on this board: gone."), "{page}");
+        assert!(!page.contains("methods/new.html") && text("index.html").contains("contamination.html"));
+        // The twin has no results on original rooms.
+        let without = folder.path().join("without");
+        write(&plan(&results), &without, false, &quiet).unwrap();
+        let index = std::fs::read_to_string(without.join("index.html")).unwrap();
+        assert!(!without.join("contamination.html").exists() && !index.contains("contamination.html"));
+    }
+
+    #[test]
+    fn results_that_say_nothing_about_contamination_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let [methods, others] = [["a", "b", "c"], ["d", "e", "f"]].map(|names| names.map(|name| (name, [20.0, 20.0])));
+        let results = redressed("r", &methods);
+        let out = folder.path().join("site");
+        let refused = |original: &[ResultFile]| {
+            let plan = LeaderboardPlan { original: Some(original), ..plan(&results) };
+            write(&plan, &out, false, &quiet).unwrap_err().to_string()
+        };
+        let error = refused(&results);
+        assert!(error.contains("the board's own dataset"), "{error}");
+        let error = refused(&redressed("o", &others));
+        assert!(error.contains("no method of the board (a, b, c)") && error.contains("(d, e, f)"), "{error}");
+        let mut older = redressed("o", &methods);
+        older.iter_mut().for_each(|result| scored_anew(result, SCORER_VERSION - 1));
+        let error = refused(&older);
+        assert!(error.contains("different rules") && error.contains(&SCORER_VERSION.to_string()), "{error}");
+        let mixed = [redressed("o", &methods[..1]), redressed("p", &methods[1..])].concat();
+        let error = refused(&mixed);
+        assert!(error.contains("--original: 'a' and 'b' have different fingerprints"), "{error}");
+        assert!(refused(&[]).contains("none was given"));
+        let without: Vec<ResultFile> = ["a", "b", "c"].map(|name| result(name, &scores(20.0, 0.1))).into();
+        let error = refused(&without);
+        assert!(error.contains("the page 'Contamination'"), "{error}");
+        assert!(!out.exists());
+        write(&LeaderboardPlan { original: Some(&redressed("o", &methods)), ..plan(&results) }, &out, false, &quiet)
+            .unwrap();
+    }
+
+    /// The twins: the split is public, or no picture shows what is hidden.
+    #[test]
+    fn a_set_of_pictures_does_not_show_a_hidden_truth() {
+        let view = mateval_dataset::ViewId::new("input").unwrap();
+        let mut results = three();
+        let check = |results: &[ResultFile], pictures: &[(&str, &str)]| {
+            let set = tempfile::tempdir().unwrap();
+            for (method, kind) in pictures {
+                let path = pictures::place(set.path(), method, &results[0].dataset.scenes[0], &view, kind);
+                std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+                png_io::write_rgb_bytes(&path, &Picture::filled(8, 6, [90; 3])).unwrap();
+            }
+            check_may_be_shown(set.path(), results).map_err(|error| error.to_string())
+        };
+        let [truth, errors, shown] = [(pictures::TRUTH, "albedo"), ("good", "albedo-error"), ("good", "albedo")];
+        check(&results, &[truth, errors, shown]).unwrap();
+        results[2].dataset.withheld = Some(Secrecy::Secret);
+        check(&results, &[shown]).unwrap();
+        for picture in [truth, errors] {
+            let error = check(&results, &[shown, picture]).unwrap_err();
+            assert!(error.contains(picture.1) && error.contains("--with-ground-truth"), "{error}");
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::{Progress, Report, SceneId, ViewId};
 use mateval_eval::error::EvalError;
 use mateval_eval::metric::PictureKind;
+use mateval_eval::result::ResultFile;
 use mateval_eval::scene::SeenLight;
 use mateval_eval::truth::scored_views;
 use mateval_files::FileError;
@@ -25,7 +26,6 @@ use crate::error::ReportError;
 use crate::ranking::file::{RankedMethod, Ranking};
 use crate::ranking::method_id;
 use crate::strips::{StripPlan, error_map, errors, rows};
-use crate::titles::Titled;
 
 /// The folder of the truth's pictures; no id of a method begins with an underscore.
 pub(super) const TRUTH: &str = "_truth";
@@ -168,6 +168,21 @@ pub fn keep_seen(set: &Path, method: &str, seen: &SeenLight<'_>) -> Result<(), E
         let folder = path.parent().unwrap_or(set);
         make_folder(folder)?;
         png_io::write_rgb_bytes(&path, &picture)?;
+    }
+    Ok(())
+}
+
+/// Fails where results are of a hidden split and the set shows its truth, which everybody who opens the site would see.
+/// Pictures of errors count: beside the prediction they narrow the truth down.
+pub fn check_may_be_shown(set: &Path, results: &[ResultFile]) -> Result<(), ReportError> {
+    if !results.iter().any(|result| result.dataset.withheld.is_some()) {
+        return Ok(());
+    }
+    for ([method, scene, view], kinds) in &PictureSet::list(set)?.kinds {
+        if let Some(kind) = kinds.iter().find(|kind| method == TRUTH || kind.ends_with(ERROR)) {
+            let path = set.join(method).join(scene).join(view).join(format!("{kind}.png"));
+            return Err(ReportError::PictureOfHiddenTruth { path });
+        }
     }
     Ok(())
 }

@@ -1,19 +1,24 @@
-//! How much the order of methods depends on choices that somebody made: the number, how scenes are summarised, and how
-//! many houses there are. Bounds that were made from the truth are left out, as they would agree with everything.
+//! What the order of methods is worth. How much it depends on choices that somebody made: the number, how scenes are
+//! summarised, and how many houses there are. Bounds that were made from the truth are left out there, as they would
+//! agree with everything. And how far methods fall from rooms with public textures to redressed ones.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_dataset::SceneId;
-use mateval_eval::metric::Metric;
+use mateval_dataset::dataset::DatasetVersion;
+use mateval_eval::metric::{Metric, PictureKind};
+use mateval_eval::result::ResultFile;
+use mateval_eval::result::key::{ResultKey, Views};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
 use super::board::Board;
-use super::columns::{Column, MethodHead, standing};
+use super::columns::{Column, Fact, MethodHead, standing, trained_on};
+use super::entries::LeaderboardPlan;
 use super::site::{Page, SiteWriter};
-use crate::error::ReportError;
-use crate::ranking::kendall_tau_b;
+use crate::error::{Mismatch, ReportError};
+use crate::ranking::{kendall_tau_b, method_means};
 
 /// The difference that the page asks about, in dB.
 const DIFFERENCE_DB: f64 = 0.3;
@@ -205,6 +210,140 @@ fn variance(values: &[f64]) -> Option<f64> {
 fn sample_size(variance: f64, difference: f64) -> usize {
     let quantiles: f64 = QUANTILES.iter().sum();
     ((quantiles / difference).powi(2) * variance).ceil().max(2.0) as usize
+}
+
+/// The numbers whose fall is shown. The last one that results have orders the methods: a scale per channel leaves out
+/// the tint, which differs between the sets.
+pub(super) const FALLS: [ResultKey; 2] = [
+    ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Psnr),
+    ResultKey::whole(PictureKind::AlbedoAligned, Views::Novel, Metric::Psnr),
+];
+
+/// The methods with a result on the original rooms and on the board's redressed ones, and those without.
+pub(super) struct Falls {
+    original: DatasetVersion,
+    pairs: Vec<Fall>,
+    /// The names of the board's methods that have no result on the original rooms.
+    only_here: Vec<String>,
+    only_there: Vec<String>,
+}
+
+struct Fall {
+    /// The place of the method among the board's.
+    at: usize,
+    /// The means on the original and on the redressed rooms, for each of [`FALLS`]; absent where one is missing.
+    means: Vec<Option<[f64; 2]>>,
+}
+
+/// Pairs the board's results with those on the original rooms, by the names of methods; none if there are none of the
+/// latter. Fails with every reason for which they say nothing about contamination.
+pub(super) fn falls(plan: &LeaderboardPlan<'_>) -> Result<Option<Falls>, ReportError> {
+    let Some(results) = plan.original else { return Ok(None) };
+    let means = |results: &[ResultFile]| method_means(results, plan.protocol, plan.partial, &FALLS);
+    let here = means(plan.results)?;
+    let there = means(results).map_err(|error| ReportError::Original(Box::new(error)))?;
+    // No list is empty, as that was refused.
+    let (Some(board), Some(original)) = (plan.results.first(), results.first()) else { return Ok(None) };
+    let mut mismatches = Vec::new();
+    if board.dataset.manifest_sha256 == original.dataset.manifest_sha256 {
+        mismatches.push(Mismatch::SameDataset { dataset: board.dataset.named() });
+    }
+    let scenes = |results: &[ResultFile]| -> BTreeSet<SceneId> {
+        results.iter().flat_map(|result| result.dataset.scenes.iter().cloned()).collect()
+    };
+    if scenes(plan.results) != scenes(results) {
+        mismatches.push(Mismatch::Scenes { first: board.shown_method(), other: original.shown_method() });
+    }
+    let both = board.protocols.get(plan.protocol).zip(original.protocols.get(plan.protocol));
+    if let Some((board, original)) = both.filter(|(board, original)| board.protocol != original.protocol) {
+        let [board, original] = [board, original].map(|scores| scores.protocol.scorer_version);
+        mismatches.push(Mismatch::OtherRules { protocol: plan.protocol.to_owned(), board, original });
+    }
+    let pair = |(at, (name, own)): (usize, &(String, Vec<Option<f64>>))| {
+        let (_, original) = there.iter().find(|(other, _)| other == name)?;
+        let both = |(original, own): (&Option<f64>, &Option<f64>)| Some([(*original)?, (*own)?]);
+        Some(Fall { at, means: original.iter().zip(own).map(both).collect() })
+    };
+    let pairs: Vec<Fall> = here.iter().enumerate().filter_map(pair).collect();
+    let [own, others] = [&here, &there].map(|all| all.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>());
+    if pairs.is_empty() {
+        mismatches.push(Mismatch::NoPair { board: own.clone(), original: others.clone() });
+    }
+    ReportError::refuse(mismatches)?;
+    if pairs.iter().all(|pair| pair.means.iter().all(Option::is_none)) {
+        let protocol = plan.protocol.to_owned();
+        return Err(ReportError::NothingToShow { protocol, output: "the page 'Contamination'" });
+    }
+    Ok(Some(Falls {
+        original: original.dataset.named(),
+        pairs,
+        only_here: own.iter().filter(|name| !others.contains(name)).cloned().collect(),
+        only_there: others.iter().filter(|name| !own.contains(name)).cloned().collect(),
+    }))
+}
+
+#[derive(Serialize)]
+struct ContaminationPage<'a> {
+    original: &'a DatasetVersion,
+    columns: Vec<&'a Column>,
+    rows: Vec<FallRow<'a>>,
+    only_here: &'a [String],
+    only_there: &'a [String],
+}
+
+#[derive(Serialize)]
+struct FallRow<'a> {
+    method: &'a MethodHead,
+    /// For each column the number on the original rooms, on the redressed ones, and the fall.
+    cells: Vec<Option<[String; 3]>>,
+    trained_on: Option<Fact>,
+}
+
+/// Writes the page, if there are results on original rooms: the method that falls furthest first.
+pub(super) fn write_contamination(
+    board: &Board<'_>,
+    falls: Option<&Falls>,
+    site: &SiteWriter<'_>,
+) -> Result<(), ReportError> {
+    let Some(falls) = falls else { return Ok(()) };
+    // The numbers that a method has in both sets, each with its place in `FALLS`.
+    let has = |at: usize| falls.pairs.iter().any(|pair| pair.means[at].is_some());
+    let shown: Vec<(usize, &Column)> = FALLS
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| has(*at))
+        .filter_map(|(at, key)| Some((at, board.columns.iter().find(|column| column.key == *key)?)))
+        .collect();
+    let fall = |pair: &Fall| {
+        let [original, own] = shown.last().and_then(|(at, _)| pair.means[*at])?;
+        Some(original - own)
+    };
+    let mut pairs: Vec<&Fall> = falls.pairs.iter().collect();
+    // Methods that lack the number are last.
+    let order = |pair: &Fall| fall(pair).unwrap_or(f64::NEG_INFINITY);
+    pairs.sort_by(|a, b| order(b).total_cmp(&order(a)));
+    let cells = |pair: &Fall, (at, column): &(usize, &Column)| {
+        pair.means[*at].map(|[original, own]| [original, own, original - own].map(|value| column.text(value)))
+    };
+    let row = |pair: &Fall| FallRow {
+        method: &board.heads[pair.at],
+        cells: shown.iter().map(|column| cells(pair, column)).collect(),
+        trained_on: trained_on(&board.file.methods[pair.at], board.scores[pair.at]),
+    };
+    let page = ContaminationPage {
+        original: &falls.original,
+        rows: pairs.into_iter().map(row).collect(),
+        columns: shown.iter().map(|(_, column)| *column).collect(),
+        only_here: &falls.only_here,
+        only_there: &falls.only_there,
+    };
+    site.page(&Page {
+        file: "contamination.html",
+        template: "contamination.j2",
+        title: "Contamination",
+        scripts: &[],
+        values: context! { page => Serde(&page) },
+    })
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ const ASSETS: [(&str, &str); 6] = [
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 15] = [
+const TEMPLATES: [(&str, &str); 16] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
     ("board.j2", include_str!("templates/board.j2")),
@@ -36,6 +36,7 @@ const TEMPLATES: [(&str, &str); 15] = [
     ("perturbed.j2", include_str!("templates/perturbed.j2")),
     ("constancy.j2", include_str!("templates/constancy.j2")),
     ("robustness.j2", include_str!("templates/robustness.j2")),
+    ("contamination.j2", include_str!("templates/contamination.j2")),
     ("votes.j2", include_str!("templates/votes.j2")),
 ];
 
@@ -83,6 +84,9 @@ pub(super) const CONSTANCY: PageLink = PageLink { file: "constancy.html", title:
 
 /// The entry of a site with methods to compare.
 pub(super) const ROBUSTNESS: PageLink = PageLink { file: "robustness.html", title: "Robustness" };
+
+/// The entry of a site of redressed rooms, with results on the original ones.
+pub(super) const CONTAMINATION: PageLink = PageLink { file: "contamination.html", title: "Contamination" };
 
 /// The entry of a site on which people vote.
 pub(super) const VOTES: PageLink = PageLink { file: "votes.html", title: "Vote" };

@@ -13,6 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use mateval_dataset::SceneId;
 use mateval_dataset::ids::unused_name;
 use mateval_dataset::submission::Map;
+use mateval_eval::metric::Metric;
+use mateval_eval::protocol::Track;
 use mateval_eval::result::key::ResultKey;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_submission::prediction::MISSING_MAP;
@@ -24,7 +26,6 @@ use self::file::{LEVEL, RankedMethod, Ranking, RankingRules};
 pub(crate) use self::key_ranking::kendall_tau_b;
 use self::key_ranking::{KeyValues, rank_key};
 use crate::error::{Mismatch, ReportError};
-use crate::titles::shown_method;
 
 /// The number of draws of houses, unless the pairs of methods need more.
 const DRAWS: usize = 10_000;
@@ -61,6 +62,27 @@ pub fn rank(results: &[ResultFile], protocol: &str, partial: bool) -> Result<Ran
     Ok(Ranking { protocol: protocol.to_owned(), fingerprint, rules, scenes, houses, methods, keys })
 }
 
+/// A method's name and its means.
+pub(crate) type MethodMeans = (String, Vec<Option<f64>>);
+
+/// The name of each method and its means of the keys over the scenes that it would be ranked on. Refuses results as
+/// [`rank`] does.
+pub(crate) fn method_means(
+    results: &[ResultFile],
+    protocol: &str,
+    partial: bool,
+    keys: &[ResultKey],
+) -> Result<Vec<MethodMeans>, ReportError> {
+    let entrants = comparable(results, protocol, partial)?;
+    let mean = |entrant: &Entrant<'_>, key: &ResultKey| {
+        let ranked = entrant.scores.scenes.iter().filter(|(scene, _)| !(partial && entrant.left_out.contains(*scene)));
+        let values: Vec<f64> = ranked.filter_map(|(_, values)| values.get(key).copied()).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let means = |entrant: &Entrant<'_>| (entrant.name(), keys.iter().map(|key| mean(entrant, key)).collect::<Vec<_>>());
+    Ok(entrants.all.iter().map(means).collect())
+}
+
 fn rules(methods: usize) -> RankingRules {
     let pairs = methods * methods.saturating_sub(1) / 2;
     RankingRules {
@@ -90,8 +112,8 @@ fn methods(entrants: &Entrants<'_>, partial: bool) -> Vec<RankedMethod> {
         let not_scored: Vec<SceneId> =
             entrants.scenes.iter().filter(|scene| !scored.contains(scene)).cloned().collect();
         RankedMethod {
-            id: unused_name(&method_id(&shown_method(entrant.result)), '-', &mut ids),
-            method: shown_method(entrant.result),
+            id: unused_name(&method_id(&entrant.result.shown_method()), '-', &mut ids),
+            method: entrant.result.shown_method(),
             submission_sha256: entrant.result.submission.sha256.clone(),
             partial: partial && !(not_scored.is_empty() && entrant.left_out.is_empty()),
             not_scored,
@@ -149,12 +171,21 @@ impl<'a> Entrant<'a> {
     }
 
     fn name(&self) -> String {
-        shown_method(self.result)
+        self.result.shown_method()
     }
 
     fn basis(&self, scenes: &[&SceneId]) -> String {
         basis(self.result, self.scores, scenes)
     }
+}
+
+/// An MSE of light that is not 0. Renders of the truth's own maps are equal to the reference in every bit, but under
+/// `paper`, whose light is fitted to the photo, which another program may have rendered.
+pub(crate) fn inexact_light(scores: &ProtocolResult) -> Option<(&ResultKey, f64)> {
+    let is_inexact =
+        |(key, value): &(&ResultKey, &f64)| key.metric == Metric::Mse && key.picture.kind.is_light() && **value != 0.0;
+    let is_exact = scores.protocol.light.tracks.contains(&Track::True);
+    scores.summary.iter().filter(|_| is_exact).find(is_inexact).map(|(key, value)| (key, *value))
 }
 
 /// The fingerprint that these scores of a result would have if these scenes had been scored; without scenes, a hash of
@@ -271,7 +302,7 @@ pub(crate) mod tests {
 
     use mateval_dataset::open::DatasetId;
     use mateval_dataset::{Finding, InstanceId, Severity, ViewId, splitmix64};
-    use mateval_eval::metric::{Metric, PictureKind};
+    use mateval_eval::metric::PictureKind;
     use mateval_eval::protocol::Protocol;
     use mateval_eval::result::key::{Region, Views};
     use mateval_eval::result::means;

@@ -16,8 +16,8 @@ use mateval_prep::compare::file::{COMPARE_FORMAT, CompareFile, SceneComparison, 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{ReportError, fitting};
-use crate::ranking::basis;
+use crate::error::{Mismatch, ReportError, fitting};
+use crate::ranking::{basis, inexact_light};
 
 /// Whether two renderers agree on a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -233,6 +233,12 @@ pub fn read_bounds(
     {
         let message = "its rules, scorer or LPIPS weights are not those of the ceiling".to_owned();
         findings.push(unfit(path, &format!("/protocols/{protocol}/fingerprint"), message));
+    }
+    if let (Some((result, scores)), Some(path)) = (&first, ceiling)
+        && let Some((key, value)) = inexact_light(scores)
+    {
+        let message = Mismatch::Ceiling { method: result.shown_method(), key: *key, value }.to_string();
+        findings.push(unfit(path, &format!("/protocols/{protocol}/summary/{key}"), message));
     }
     if !findings.is_empty() {
         return Err(ReportError::UnfitForRelease(findings));

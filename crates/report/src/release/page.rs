@@ -307,6 +307,7 @@ mod tests {
                 super_categories_per_scene: spread(4.3),
                 categories_per_scene: spread(8.0),
                 look: None,
+                beside: None,
                 total: counts(),
                 per_scene: ids()
                     .map(|scene| SceneStats {

@@ -10,7 +10,6 @@ use serde::Serialize;
 
 use super::file::{ReleaseFile, ReleasedScene};
 use super::given::{ReferenceScores, SceneVerdict, StateCount};
-use crate::titles::Titled;
 
 /// The scores of the table's columns.
 pub(crate) const SHOWN_SCORES: [(&str, ResultKey); 2] = [

@@ -8,8 +8,6 @@ use mateval_eval::result::key::Views::{Input, Novel, Observed, Unobserved, Wide,
 use mateval_eval::result::key::{PictureName, ResultKey, Surfaces, Views};
 use mateval_eval::result::{Constancy, Deviation};
 
-use crate::titles::Titled;
-
 /// How the rows of a table are grouped; every group has one row for each method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grouping {

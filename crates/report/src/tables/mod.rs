@@ -16,7 +16,7 @@ pub(crate) use layouts::{CellKey, ConstancyMeans, Value};
 pub(crate) use table::pooled;
 
 use crate::error::{Mismatch, ReportError};
-use crate::titles::shown_method;
+use crate::ranking::inexact_light;
 use mateval_eval::result::ResultFile;
 
 /// How a table is written.
@@ -102,9 +102,14 @@ fn check_comparable(results: &[ResultFile], ceiling: Option<&ResultFile>, protoc
     let first = results.first().ok_or(ReportError::NoResults)?;
     let fingerprint = |result: &ResultFile| result.protocols.get(protocol).map(|scores| scores.fingerprint.clone());
     let mut mismatches = Vec::new();
+    if let Some(ceiling) = ceiling
+        && let Some((key, value)) = ceiling.protocols.get(protocol).and_then(inexact_light)
+    {
+        mismatches.push(Mismatch::Ceiling { method: ceiling.shown_method(), key: *key, value });
+    }
     for result in results.iter().chain(ceiling) {
         let of_result = Mismatch::of_result(result, protocol);
-        let (first_name, other) = (shown_method(first), shown_method(result));
+        let (first_name, other) = (first.shown_method(), result.shown_method());
         if of_result.is_none() && fingerprint(first).is_some_and(|first| Some(first) != fingerprint(result)) {
             mismatches.push(Mismatch::Fingerprints { first: first_name.clone(), other: other.clone() });
         }

@@ -10,7 +10,6 @@ use mateval_eval::result::{InstancePixelErrors, ProtocolResult, ResultFile};
 use mateval_metrics::Psnr;
 
 use super::layouts::{CellKey, Grouping, Layout, Quantity, Value, constancy_values};
-use crate::titles::shown_method;
 
 /// One method's numbers.
 pub(super) struct Row {
@@ -54,7 +53,7 @@ pub(super) fn groups(
             let families: Vec<Constancy> = result.constancy.iter().filter(of_group).cloned().collect();
             let constancy = constancy_values(&families).into_iter();
             values.extend(constancy.map(|(key, value)| (key, Value { value, standard_error: None })));
-            Row { method: shown_method(result), values, not_predicted: result.not_predicted.clone() }
+            Row { method: result.shown_method(), values, not_predicted: result.not_predicted.clone() }
         };
         let mut rows: Vec<Row> = scored.iter().enumerate().map(row).collect();
         let ceiling = ceiling.and_then(|_| rows.pop());

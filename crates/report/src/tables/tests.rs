@@ -133,6 +133,13 @@ fn the_ceiling_comes_last() {
 ";
     assert_eq!(of(TableFormat::Markdown), expected);
     assert!(of(TableFormat::Csv).contains("\"gt (ceiling)\",45,0.016"), "{}", of(TableFormat::Csv));
+    let mut lit = light("gt", 45.0);
+    let mut scores = lit.protocols.remove("paper").unwrap();
+    scores.protocol = Protocol::named(Protocol::DEFAULT).unwrap();
+    scores.summary.insert("rgb_true.input.mse".parse().unwrap(), 1e-9);
+    lit.protocols.insert("paper".to_owned(), scores);
+    let refused = tables(&results, Some(&lit), "paper", Grouping::Dataset, TableFormat::Csv).unwrap_err();
+    assert!(refused.to_string().contains("the ceiling 'gt' is not the truth: expected 0"), "{refused}");
     let mut other = ceiling;
     other.protocols.get_mut("paper").unwrap().fingerprint = "another".to_owned();
     let error = tables(&results, Some(&other), "paper", Grouping::Dataset, TableFormat::Csv).unwrap_err();

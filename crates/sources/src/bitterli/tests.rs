@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use mateval_dataset::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
 use mateval_dataset::reference::{Emission, EmissionMap, SurfaceIndex};
-use mateval_dataset::{Severity, obj};
+use mateval_dataset::{Finding, Severity, obj};
 use mateval_image::{LinearRgb, Picture, Texels, exr_io};
 use mateval_testkit::{kept_folder, shared_data};
 use proptest::prelude::*;
@@ -51,7 +51,7 @@ pub(crate) fn read_xml(xml: &str) -> Result<FileScene, SourceError> {
 }
 
 /// A scene of version 0.6 with a sensor and `inner`.
-pub(crate) fn read_inner(inner: &str) -> FileScene {
+fn read_inner(inner: &str) -> FileScene {
     read_xml(&format!("<scene version='0.6.0'>{SENSOR}{inner}</scene>")).unwrap()
 }
 
@@ -688,5 +688,95 @@ fn bathroom() {
         let missing: Vec<_> = scene.findings.iter().filter(|f| f.code == "missing_file").map(|f| &f.file).collect();
         assert_eq!(missing, ["models/Mesh206.obj", "models/Mesh263.obj", "models/Mesh381.obj", "textures/rug.png"]);
         assert_eq!(warnings_at(&scene).len(), 4, "{:?}", warnings_at(&scene));
+    }
+}
+
+/// Every value that the reader uses in place of what it cannot read, what in a scene makes it do so, and the code of the
+/// finding that says so.
+fn fallbacks() -> Vec<(&'static str, String, &'static str)> {
+    let in_cube = |inner: &str| format!("<shape type='cube'>{inner}</shape>");
+    let bsdf = |kind: &str, inner: &str| in_cube(&format!("<bsdf type='{kind}'>{inner}</bsdf>"));
+    let color = |name: &str, value: &str| bsdf("diffuse", &format!("<rgb name='{name}' value='{value}'/>"));
+    let string = |name: &str, value: &str| format!("<string name='{name}' value='{value}'/>");
+    let bitmap = |file: &str, extra: &str| {
+        let file = string("filename", file);
+        bsdf("diffuse", &format!("<texture name='reflectance' type='bitmap'>{file}{extra}</texture>"))
+    };
+    let checkerboard = bsdf("diffuse", "<texture name='reflectance' type='checkerboard'/>");
+    let anisotropic = "<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.4'/>";
+    let obj = "<shape type='obj'><string name='filename' value='plain.obj'/>";
+    let without_uv = bitmap("a b.png", "").replace("<shape type='cube'>", obj);
+    let blend = bsdf("blendbsdf", "<bsdf type='diffuse'/><bsdf type='plastic'/>");
+    let clearcoat = bsdf("principled", "<float name='clearcoat' value='1'/>");
+    let environment = format!("<emitter type='envmap'>{}</emitter>", string("filename", "none.exr"));
+    let low_sun = "<emitter type='sky'><vector name='sunDirection' value='0 -1 0'/></emitter>";
+    let bright = "<emitter type='area'><rgb name='radiance' value='bright'/></emitter>";
+    vec![
+        ("diffuse grey 0.5", in_cube(""), "no_bsdf"),
+        ("diffuse grey 0.5", bsdf("velvet", ""), "unknown_plugin"),
+        ("diffuse grey 0.5", bsdf("twosided", ""), "missing_child"),
+        ("linear mid-grey", bitmap("none.png", ""), "missing_file"),
+        ("linear mid-grey", checkerboard, "unknown_plugin"),
+        ("the plugin's default colour", color("reflectance", "red"), "bad_value"),
+        ("the plugin's default colour, for one out of range", color("reflectance", "3"), "out_of_range"),
+        ("the plugin's default colour, for an unknown name", color("reflectence", "0.2"), "unknown_parameter"),
+        ("the texture's colour as it is, of another range", bitmap("bytes.exr", ""), "out_of_range"),
+        ("the colour of the first of two", blend, "unsupported"),
+        ("beckmann", bsdf("roughplastic", &string("distribution", "phong")), "unsupported"),
+        ("the default metal's colour", bsdf("conductor", &string("material", "Unobtainium")), "unknown_material"),
+        ("no shape", in_cube("<transform name='to_world'><matrix value='1'/></transform>"), "bad_transform"),
+        ("no light", environment, "missing_file"),
+        ("no light", "<emitter type='point'/>".into(), "unknown_plugin"),
+        ("the first of two environments", "<emitter type='constant'/>".repeat(2), "unsupported"),
+        ("the sun 45 degrees high", "<emitter type='sky'/>".into(), "sun_by_time"),
+        ("the sun at the horizon", low_sun.into(), "out_of_range"),
+        ("radiance 1", in_cube(bright), "bad_value"),
+        ("the geometric mean of both", bsdf("roughconductor", anisotropic), "unsupported"),
+        ("0 for what the principled model lacks", clearcoat, "unsupported"),
+        ("no bumps", bsdf("bumpmap", "<bsdf type='diffuse'/>"), "missing_child"),
+        ("the mode of u", bitmap("a b.png", &string("wrap_mode_v", "clamp")), "unsupported"),
+        ("all channels", bitmap("a b.png", &string("channel", "r")), "unsupported"),
+        ("all channels, for an unknown one", bitmap("a b.png", &string("channel", "z")), "bad_value"),
+        ("the text of an unknown variable", color("reflectance", "$none"), "unknown_variable"),
+        ("no reference", in_cube("<ref id='nobody'/>"), "unknown_id"),
+        ("no medium", "<medium type='homogeneous'/>".into(), "unsupported"),
+        ("barycentric coordinates", without_uv, "no_uv"),
+    ]
+}
+
+#[test]
+fn each_fallback_is_a_finding_and_the_rest_is_read() {
+    for (value, input, code) in fallbacks() {
+        let scene = read_inner(&format!("{input}<shape type='rectangle' id='rest'><bsdf type='diffuse'/></shape>"));
+        // Nothing is lost: this grey is Mitsuba's own default.
+        let severity = if code == "no_bsdf" { Severity::Note } else { Severity::Warning };
+        let is_expected = |finding: &Finding| finding.code == code && finding.severity == severity;
+        assert!(scene.findings.iter().any(is_expected), "{value}: {input}: {:?}", scene.findings);
+        assert_eq!(scene.scene.surfaces.last().map(|s| s.name.as_str()), Some("rest"), "{input}");
+        // A colour that nobody states must not count as stated.
+        if value.contains("grey") || value.contains("colour") {
+            assert!(scene.origins.iter().any(|origin| !origin.stated.base_color), "{input}");
+        }
+    }
+    let without = "<scene version='3.0.0'><sensor type='perspective'/></scene>";
+    let codes = |text: &str| -> Vec<String> {
+        read_xml(text).unwrap().findings.into_iter().map(|finding| finding.code).collect()
+    };
+    assert!(codes(without).contains(&"no_field_of_view".to_owned()));
+    assert!(codes(&without.replace("3.0.0", "9")).contains(&"unknown_version".to_owned()));
+    for (sensor, code) in [
+        ("<sensor type='thinlens'><float name='fov' value='9'/></sensor>", "unsupported"),
+        ("<sensor type='perspective'><float name='fov' value='wide'/></sensor>", "bad_value"),
+        (
+            "<sensor type='perspective'><float name='fov' value='9'/><string name='fov_axis' value='w'/></sensor>",
+            "bad_value",
+        ),
+        (
+            "<sensor type='perspective'><float name='fov' value='9'/><film type='hdrfilm'><integer name='width' value='none'/></film></sensor>",
+            "bad_value",
+        ),
+    ] {
+        let found = codes(&format!("<scene version='3.0.0'>{sensor}</scene>"));
+        assert!(found.contains(&code.to_owned()), "{sensor}: {found:?}");
     }
 }

@@ -25,7 +25,7 @@ mod material_class;
 mod model;
 pub mod room_scene;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;
 
 pub use document::Limits;
 pub use furnish::{FurnishedHouse, HouseFiles, PlacedModel, PlacedSurface, furnish, read_house};

@@ -202,7 +202,7 @@ fn lone_house(folder: &Path, text: &[u8]) -> HouseFiles {
 }
 
 /// The codes of the findings of a small house, in which the value at a JSON pointer is replaced.
-pub(crate) fn house_findings(pointer: &str, value: Value) -> Vec<String> {
+fn house_findings(pointer: &str, value: Value) -> Vec<String> {
     let mut house = json!({
         "uid": "small",
         "material": [{ "uid": "m", "color": [200, 100, 50], "UVTransform": [1, 0, 0, 0, 1, 0, 0, 0, 1] }],
@@ -219,4 +219,28 @@ pub(crate) fn house_findings(pointer: &str, value: Value) -> Vec<String> {
     let mut log = crate::log::Log::new("house.json".to_owned(), 100);
     house::read(&house, "small", &Limits::default(), &mut log).unwrap();
     log.into_findings().into_iter().map(|finding| finding.code).collect()
+}
+
+/// Every value that the reader uses in place of what it cannot read, a change of a small house that makes it do so, and
+/// the code of the finding that says so.
+#[test]
+fn each_fallback_is_a_finding() {
+    for (value, (pointer, changed), code) in [
+        ("white", ("/material/0/color", json!("red")), "bad_color"),
+        ("mid-grey", ("/mesh/0/material", json!("nobody")), "no_material"),
+        ("white", ("/material/0/color", json!([1, 1, 1])), "bad_color"),
+        ("no mesh", ("/scene/room/0/children/0/ref", json!("nobody")), "dangling_ref"),
+        ("no numbers", ("/mesh/0/xyz", json!("0 0 0")), "bad_number"),
+        ("no record", ("/mesh/0/uid", json!(null)), "no_uid"),
+        ("no texture coordinates", ("/mesh/0/uv", json!(["a"])), "bad_uv"),
+        ("geometric normals", ("/mesh/0/normal", json!("x")), "bad_normals"),
+        ("the other triangles", ("/mesh/0/faces/0", json!(99)), "bad_faces"),
+        ("no rotation", ("/scene/room/0/children/0/rot", json!("x")), "bad_placement"),
+        ("the origin", ("/scene/room/0/children/0/pos", json!([1e30, 0, 0])), "bad_placement"),
+        ("the identity", ("/material/0/UVTransform", json!([1])), "bad_uv_transform"),
+    ] {
+        let codes = house_findings(pointer, changed);
+        assert!(codes.contains(&code.to_owned()), "{value}: {pointer}: {codes:?}");
+    }
+    assert_eq!(house_findings("/uid", json!("x")), [""; 0], "the house itself is sound");
 }

@@ -15,7 +15,7 @@ mod nodes;
 mod punctual;
 mod reader;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;
 mod textures;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -47,7 +47,7 @@ fn triangle() -> Value {
 }
 
 /// [`triangle`] with the value at a JSON pointer set. A missing key is added; `-` appends to a list.
-pub(crate) fn with(pointer: &str, value: Value) -> Value {
+fn with(pointer: &str, value: Value) -> Value {
     changed(triangle(), pointer, value)
 }
 
@@ -79,7 +79,7 @@ fn read_bytes(bytes: &[u8]) -> Result<FileScene, SourceError> {
     read_bytes_in(tempfile::tempdir().unwrap().path(), bytes)
 }
 
-pub(crate) fn read_json(file: &Value) -> FileScene {
+fn read_json(file: &Value) -> FileScene {
     read_bytes(file.to_string().as_bytes()).unwrap()
 }
 
@@ -677,4 +677,99 @@ fn colours_that_may_be_baked_to_emission_are_named() {
     };
     assert!(emitting(json!({})) && emitting(json!({ "baseColorFactor": [0, 0, 0, 1] })));
     assert!(!emitting(json!({ "baseColorFactor": [0.5, 0.5, 0.5, 1] })));
+}
+
+/// A triangle whose vertices have these colours.
+fn painted(colors: [f32; 9]) -> Value {
+    let bytes: Vec<u8> = colors.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let mut file = with("/meshes/0/primitives/0/attributes/COLOR_0", json!(3));
+    let mut append = |key: &str, value: Value| file[key].as_array_mut().expect("a list").push(value);
+    append("buffers", json!({ "byteLength": 36, "uri": data_uri(&bytes) }));
+    append("bufferViews", json!({ "buffer": 1, "byteLength": 36 }));
+    append("accessors", json!({ "bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC3" }));
+    file["materials"][0]["pbrMetallicRoughness"] = json!({ "baseColorFactor": [1, 1, 1, 1] });
+    file
+}
+
+#[test]
+fn what_multiplies_or_exceeds_a_base_colour_unstates_it() {
+    let states = |file: &Value| read_json(file).origins[0].stated.base_color;
+    assert!(!states(&painted([0.5; 9])));
+    assert!(states(&painted([1.0; 9])), "its twin: white for all vertices");
+    let factor = |factor: Value| with("/materials/0/pbrMetallicRoughness", json!({ "baseColorFactor": factor }));
+    assert!(!states(&factor(json!([200, 100, 50, 1]))) && !states(&factor(json!([0.5, -0.2, 0, 1]))));
+    assert!(states(&factor(json!([1.0000001, 0.5, 0, 1]))));
+}
+
+/// Every value that the reader uses in place of what it cannot read, a file that makes it do so, and the code of the
+/// finding that says so.
+fn fallbacks() -> Vec<(&'static str, Value, &'static str)> {
+    let material = |key: &str, value: Value| with("/materials/0", json!({ "pbrMetallicRoughness": {}, key: value }));
+    let camera_of = |aspect: Value, yfov: f64| {
+        let mut file = with("/nodes/0/camera", json!(0));
+        file["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": yfov, "znear": 0.1 } }]);
+        if !aspect.is_null() {
+            file["cameras"][0]["perspective"]["aspectRatio"] = aspect;
+        }
+        file
+    };
+    let camera = |aspect: Value| camera_of(aspect, 1.0);
+    let textured = |texture: Value| {
+        let mut file = with("/materials/0/pbrMetallicRoughness/baseColorTexture", json!({ "index": 0 }));
+        (file["textures"], file["images"]) = (json!([texture]), json!([{ "uri": "none.png" }]));
+        file
+    };
+    let mut no_uv = textured(json!({ "source": 0 }));
+    no_uv["meshes"][0]["primitives"][0]["attributes"] = json!({ "POSITION": 0 });
+    vec![
+        ("linear mid-grey", textured(json!({ "source": 0 })), "missing_file"),
+        ("the factor alone", textured(json!({})), "not_represented"),
+        ("mid-grey where the texture has no place either", no_uv, "missing_file"),
+        ("no rotation", with("/nodes/0/rotation", json!([0, 0, 0, 0])), "bad_value"),
+        ("the other triangles", with("/accessors/2/count", json!(2)), "bad_indices"),
+        ("no texture coordinates", with("/accessors/1/count", json!(2)), "bad_attribute"),
+        ("an index of 1.5", material("extensions", json!({ "KHR_materials_ior": { "ior": 9.0 } })), "not_represented"),
+        (
+            "an opaque surface",
+            material("extensions", json!({ "KHR_materials_transmission": { "transmissionFactor": 0.2 } })),
+            "not_represented",
+        ),
+        ("radiance 1 from outside", with("/asset/generator", json!("x")), "no_light"),
+        ("16 to 9, or the recipe's resolution, for a picture", camera(json!(null)), "no_aspect_ratio"),
+        ("no camera of a field of view in degrees", camera_of(json!(1.5), 55.0), "bad_value"),
+        ("the same for width over height of 0", camera(json!(0)), "no_aspect_ratio"),
+        (
+            "a clamped factor",
+            material("pbrMetallicRoughness", json!({ "baseColorFactor": [200, 100, 50, 1] })),
+            "out_of_range",
+        ),
+        ("a clamped roughness", material("pbrMetallicRoughness", json!({ "roughnessFactor": 30 })), "out_of_range"),
+        ("no colours of vertices", painted([0.5; 9]), "not_represented"),
+        (
+            "no normal map",
+            {
+                let mut file = with("/materials/0/normalTexture", json!({ "index": 0 }));
+                (file["textures"], file["images"]) = (json!([{ "source": 0 }]), json!([{ "uri": "none.png" }]));
+                file
+            },
+            "not_represented",
+        ),
+        (
+            "a node left out",
+            with("/nodes/0/matrix", json!([1, 0, 0, 0.2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])),
+            "bad_transform",
+        ),
+    ]
+}
+
+#[test]
+fn each_fallback_is_a_finding() {
+    for (value, input, code) in fallbacks() {
+        let findings = read_json(&input).findings;
+        assert!(findings.iter().any(|finding| finding.code == code), "{value}: {findings:?}");
+    }
+    // The default of the format for a base colour is marked, since the reader does not know its share of the
+    // picture.
+    let scene = read_json(&with("/asset/generator", json!("x")));
+    assert!(!scene.origins[0].stated.base_color && scene.origins[0].stated.roughness);
 }

@@ -1,5 +1,5 @@
 #![no_main]
-//! Reads a photo: orientation, colour profile and gamma of PNG, JPEG and WebP.
+//! Reads a photo: orientation, colour profile and gamma of PNG, JPEG, WebP and TIFF.
 
 use std::path::Path;
 
