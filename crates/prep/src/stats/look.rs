@@ -53,8 +53,8 @@ pub struct LookDistribution {
     pub deviation: f64,
     /// The width of a bin of the histogram: 0.01 for chroma and local contrast, 1/32 for the others.
     pub bin: f64,
-    /// The share of the values in each of 32 bins, the first of which begins at 0; values above the last bin count as in
-    /// it. All shares are 0 if there are no values.
+    /// The share of the values in each of 32 bins. The first bin begins at 0, and the last one also holds larger values.
+    /// All shares are 0 if there are no values.
     pub histogram: [f64; BINS],
 }
 
@@ -91,7 +91,7 @@ pub(super) struct Pair<'a> {
     pub(super) name: &'static str,
     pub(super) own: &'a LookDistribution,
     pub(super) other: &'a LookDistribution,
-    /// None where one of both has no values.
+    /// Absent if one of the two has no values.
     pub(super) distance: Option<f64>,
 }
 

@@ -235,8 +235,8 @@ struct Fall {
     means: Vec<Option<[f64; 2]>>,
 }
 
-/// Pairs the board's results with those on the original rooms, by the names of methods; none if there are none of the
-/// latter. Fails with every reason for which they say nothing about contamination.
+/// Pairs the board's results with those on the original rooms, by the names of methods; absent without the latter. Fails
+/// with every reason for which they say nothing about contamination.
 pub(super) fn falls(plan: &LeaderboardPlan<'_>) -> Result<Option<Falls>, ReportError> {
     let Some(results) = plan.original else { return Ok(None) };
     let means = |results: &[ResultFile]| method_means(results, plan.protocol, plan.partial, &FALLS);
