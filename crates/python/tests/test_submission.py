@@ -403,7 +403,7 @@ def scores(root, nn, command, tmp_path_factory):
     return [mateval.score(folder / "grey", root), mateval.score(nn, root)], folder
 
 
-def test_results_are_saved_loaded_and_compared(scores, tmp_path, monkeypatch):
+def test_results_are_saved_loaded_and_compared(root, scores, command, tmp_path, monkeypatch):
     (grey, nn), _ = scores
     nn.save(tmp_path / "nn.json")
     with pytest.raises(FileExistsError):
@@ -425,8 +425,12 @@ def test_results_are_saved_loaded_and_compared(scores, tmp_path, monkeypatch):
     assert "| grey |" in mateval.tables([grey, nn], format="markdown")
     monkeypatch.setitem(sys.modules, "pandas", None)
     assert mateval.rank([grey, nn])[0]["method"] == nn.method
-    rows = mateval.tables([grey, nn], ceiling=nn, by="scene")["Albedo, novel views"]
-    assert [(row["Scene"], row["method"]) for row in rows][0] == ("room", "grey"), rows
+    with pytest.raises(mateval.Error, match="the ceiling 'nn-gt' is not the truth"):
+        mateval.tables([grey], ceiling=nn)
+    command("baseline", "gt", "--dataset", root, "--out", tmp_path / "gt")
+    truth = mateval.score(tmp_path / "gt", root)
+    rows = mateval.tables([grey, nn], ceiling=truth, by="scene")["Albedo, novel views"]
+    assert [(row["Scene"], row["method"]) for row in rows] == [("room", "grey"), ("room", "nn-gt"), ("room", "gt")], rows
     with pytest.raises(mateval.UnknownId, match="expected a key such as 'albedo.novel.psnr'"):
         mateval.rank([nn], key="albedo.novel.psn")
     with pytest.raises(TypeError, match="Result.load reads a file"):
