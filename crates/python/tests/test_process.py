@@ -227,9 +227,10 @@ def test_programs_are_typed(tmp_path):
 def test_the_import_is_quick_and_lazy():
     program = textwrap.dedent("""
         import sys, time
-        start = time.perf_counter()
+        # Of the processor: the clock's depends on what else runs.
+        start = time.process_time()
         import mateval
-        print(time.perf_counter() - start)
+        print(time.process_time() - start)
         assert not {"numpy", "torch", "trimesh"} & set(sys.modules)
     """)
     runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True) for _ in range(5)]

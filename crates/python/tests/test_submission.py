@@ -430,7 +430,7 @@ def test_results_are_saved_loaded_and_compared(root, scores, command, tmp_path, 
     command("baseline", "gt", "--dataset", root, "--out", tmp_path / "gt")
     truth = mateval.score(tmp_path / "gt", root)
     rows = mateval.tables([grey, nn], ceiling=truth, by="scene")["Albedo, novel views"]
-    assert [(row["Scene"], row["method"]) for row in rows] == [("room", "grey"), ("room", "nn-gt"), ("room", "gt")], rows
+    assert [(row["Scene"], row["method"]) for row in rows] == [("room", "grey"), ("room", "nn-gt"), ("room", "gt (ceiling)")], rows
     with pytest.raises(mateval.UnknownId, match="expected a key such as 'albedo.novel.psnr'"):
         mateval.rank([nn], key="albedo.novel.psn")
     with pytest.raises(TypeError, match="Result.load reads a file"):
