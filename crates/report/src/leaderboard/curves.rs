@@ -27,6 +27,10 @@ const SHARES: u32 = 5;
 /// Size of a chart, and the margins around its lines, in its own units.
 const SIZE: [f64; 2] = [320.0, 180.0];
 const MARGIN: [f64; 2] = [28.0, 16.0];
+/// The width and height of a point's label.
+const LABEL: [f64; 2] = [12.0, 8.0];
+/// The right end of the axis of accuracy: the truth's own value, of 60 dB and more, would press the methods into a corner.
+const MOST_ACCURATE_DB: f64 = 40.0;
 
 pub(super) fn has_wide_views(board: &Board<'_>) -> bool {
     board.results.iter().any(|result| !result.dataset.wide_views.is_empty())
@@ -251,6 +255,8 @@ struct Chart {
     /// The places of the top and bottom lines, and their values.
     scale: [(f64, String); 2],
     lines: Vec<Line>,
+    /// Of points: their rows in the table, beside them; points that lie on each other share one.
+    labels: Vec<([f64; 2], String)>,
 }
 
 /// The line of one method.
@@ -315,15 +321,14 @@ impl Chart {
             columns: classes.iter().map(|class| column(*class)).collect(),
             scale: [high, low].map(|value| (row(value), text(value))),
             lines: methods.iter().map(line).collect(),
+            labels: Vec::new(),
         })
     }
-}
 
-impl Chart {
     /// A point for each method, more accurate ones on the right and more constant ones at the bottom; those without a
-    /// deviation are in the table alone. None where there are no two points to compare.
+    /// deviation are in the table alone. Absent if there are no two points to compare.
     fn of_points(title: String, points: &[Point<'_>], cells: Vec<Vec<Option<String>>>) -> Option<Self> {
-        let placed = || points.iter().filter_map(|(_, x, y)| Some((*x, (*y)?)));
+        let placed = || points.iter().filter_map(|(_, x, y)| Some((x.min(MOST_ACCURATE_DB), (*y)?)));
         if placed().count() < 2 {
             return None;
         }
@@ -333,7 +338,8 @@ impl Chart {
         let ([left, right], [low, high]) = (range(&|(x, _)| x), range(&|(_, y)| y));
         let share = |value: f64, low: f64, high: f64| if high > low { (value - low) / (high - low) } else { 0.5 };
         let [width, height] = SIZE;
-        let column = |x: f64| rounded(MARGIN[0] + share(x, left, right) * (width - 2.0 * MARGIN[0]));
+        let column =
+            |x: f64| rounded(MARGIN[0] + share(x.min(MOST_ACCURATE_DB), left, right) * (width - 2.0 * MARGIN[0]));
         let row = |y: f64| rounded(height - MARGIN[1] - share(y, low, high) * (height - 2.0 * MARGIN[1]));
         let line = |((name, x, y), cells): (&Point<'_>, Vec<Option<String>>)| Line {
             name: (*name).to_owned(),
@@ -341,13 +347,29 @@ impl Chart {
             dots: y.iter().map(|y| [column(*x), row(*y)]).collect(),
             cells,
         };
+        let lines: Vec<Line> = points.iter().zip(cells).map(line).collect();
+        let mut labels: Vec<([f64; 2], String)> = Vec::new();
+        for (number, line) in (1..).zip(&lines) {
+            for dot in &line.dots {
+                let near = |[x, y]: [f64; 2]| (x - dot[0]).abs() < LABEL[0] && (y - dot[1]).abs() < LABEL[1];
+                match labels.iter_mut().find(|(place, _)| near(*place)) {
+                    Some((_, label)) => *label += &format!(", {number}"),
+                    None => labels.push((*dot, number.to_string())),
+                }
+            }
+        }
+        let accuracy = |x: f64| {
+            let least = if x >= MOST_ACCURATE_DB { "≥ " } else { "" };
+            format!("{least}{} dB", Metric::Psnr.style().text(x))
+        };
         Some(Self {
             title,
-            classes: [left, right].map(|x| format!("{} dB", Metric::Psnr.style().text(x))).into(),
+            classes: [left, right].map(accuracy).into(),
             columns: [left, right].map(column).into(),
             heads: ["PSNR of the mean", "Relative deviation", "RMS deviation", "CIEDE2000"].map(str::to_owned).into(),
             scale: [high, low].map(|y| (row(y), format!("{y:.3}"))),
-            lines: points.iter().zip(cells).map(line).collect(),
+            lines,
+            labels,
         })
     }
 }
@@ -396,13 +418,15 @@ mod tests {
     #[test]
     fn points_are_placed_by_both_numbers() {
         let cells = |count: usize| vec![vec![Some("1".to_owned())]; count];
-        let points = [("gt", 60.0, Some(0.0)), ("nn", 20.0, Some(0.5)), ("grey", 15.0, None)];
-        let chart = Chart::of_points("t".to_owned(), &points, cells(3)).unwrap();
+        let points =
+            [("gt", 60.0, Some(0.0)), ("nn", 20.0, Some(0.5)), ("grey", 15.0, None), ("photo", 20.1, Some(0.5))];
+        let chart = Chart::of_points("t".to_owned(), &points, cells(4)).unwrap();
         let [width, height] = SIZE;
         assert_eq!(chart.lines[0].dots, [[width - MARGIN[0], height - MARGIN[1]]]);
         assert_eq!(chart.lines[1].dots, [[MARGIN[0], MARGIN[1]]]);
         assert!(chart.lines[2].dots.is_empty() && chart.lines[2].cells.len() == 1);
-        assert_eq!(chart.classes, ["20.00 dB", "60.00 dB"]);
+        assert_eq!(chart.classes, ["20.00 dB", "≥ 40.00 dB"]);
+        assert_eq!(chart.labels.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>(), ["1", "2, 4"]);
         let one = [("gt", 60.0, Some(0.0)), ("grey", 15.0, None)];
         assert_eq!(Chart::of_points("t".to_owned(), &one, cells(2)), None);
     }
