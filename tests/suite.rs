@@ -14,6 +14,7 @@ mod suite {
     mod blender;
     mod blender_import;
     mod captured_export;
+    mod captured_rooms;
     mod circles;
     mod command;
     mod compare;
@@ -31,6 +32,7 @@ mod suite {
     mod house;
     mod images;
     mod importing;
+    mod leaks;
     mod lifting;
     mod linting;
     mod map;

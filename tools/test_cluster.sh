@@ -1,7 +1,8 @@
 #!/bin/sh
 # A rehearsal of a release at full size on a Slurm of two nodes, both on this machine: tools/test_cluster.sh [ROOMS] [FOLDER].
 # One serial run and one on the cluster, in which a node and the controller are killed, must give the same manifest and
-# results. Needs root, Debian and two cores; changes /etc/slurm. 184 rooms (the default) take about an hour.
+# results. A third of the rooms has a twin, another third is redressed, and results are verified and signed as a keeper of
+# a board does. Needs root, Debian and two cores; changes /etc/slurm. 184 rooms (the default) take about an hour.
 set -eu
 cd "$(dirname "$0")/.."
 rooms=${1:-184}
@@ -77,6 +78,14 @@ sinfo
 
 "$mateval" sample "$work/source" --houses "$rooms" --force
 sed -i 's/^resolution = .*/resolution = [32, 24]\natlas_size = 64\nsamples = 1/' "$work/source/recipe.toml"
+mkdir -p "$work/secret"
+[ -f "$work/secret/rooms" ] || head -c 32 /dev/urandom > "$work/secret/rooms"
+awk '{ print }
+    /^id = / { scene++ }
+    /^id = / && scene % 3 == 1 { print "twins = [\"warm_cool\"]" }
+    /^id = / && scene % 3 == 2 { print "redress = { key = \"../secret/rooms\" }" }
+    ' "$work/source/recipe.toml" > "$work/recipe.toml"
+mv "$work/recipe.toml" "$work/source/recipe.toml"
 
 # One process after another.
 serial() {
@@ -98,11 +107,13 @@ cost='{build: {threads: 1, mem_mb: 900}, render: {threads: 1, mem_mb: 900}, scor
 cat > config.yaml <<CONF
 recipe: $work/source/recipe.toml
 renderer: builtin
+publish: --with-ground-truth
 mateval: $mateval
 cost: $cost
 CONF
+snakefile=Snakefile
 run_snakemake() {
-    "$work/snakemake/bin/snakemake" --snakefile "$root/tools/cluster/Snakefile" --profile "$root/tools/cluster/profiles/slurm" \
+    "$work/snakemake/bin/snakemake" --snakefile "$root/tools/cluster/$snakefile" --profile "$root/tools/cluster/profiles/slurm" \
         --configfile config.yaml --jobs 8 --default-resources slurm_partition=batch --slurm-no-account \
         --slurm-status-command squeue --slurm-init-seconds-before-status-checks 2 --seconds-between-status-checks 2 \
         --latency-wait 10 --max-jobs-per-timespan 100/1s "$@" >> snakemake.log 2>&1
@@ -161,4 +172,34 @@ for method in gt grey nn; do
 done
 grep -q "No scene failed" report.md
 cat report.md
+
+for kind in '"twins"' '"redressed"'; do
+    count=$(grep -l "$kind" dataset/dataset.json dataset/scenes/*/scene.json | wc -l)
+    [ "$count" -gt 0 ] || { echo "no scene has $kind"; exit 1; }
+done
+"$mateval" key new "$work/secret/keeper" --force
+for method in gt nn; do
+    "$mateval" eval verify "results/$method.json" --submission "submissions/$method" --dataset dataset \
+        --out "results/$method.verified.json" --sign "$work/secret/keeper" --force
+done
+"$mateval" eval leaderboard results/nn.json --ceiling results/gt.json --trust "$work/secret/keeper.pub" --out board --force
+grep -q '"verified": *"confirmed"' board/downloads/leaderboard.json
 echo "The manifest and the results equal those of the serial run."
+
+# A survey of other houses, serial and in jobs of five houses.
+houses="$work/houses/house"
+"$mateval" sample "$work/houses" --houses $(((rooms + 3) / 4)) --force
+mkdir -p "$work/survey" "$work/survey/serial"
+cd "$work/survey"
+cat > config.yaml <<CONF
+{source: $houses, houses: 3D-FRONT, models: 3D-FUTURE-model, textures: 3D-FRONT-texture, batch: 5, mateval: $mateval,
+ cost: {search: {threads: 1, mem_mb: 900}, survey: {threads: 1, mem_mb: 900}}}
+CONF
+"$mateval" prep survey 3D-FRONT --source "$houses" --models 3D-FUTURE-model --textures 3D-FRONT-texture \
+    --out serial/survey --force
+snakefile=survey.smk
+run_snakemake
+for file in survey.json recipe.toml; do
+    cmp "serial/survey/$file" "survey/$file"
+done
+echo "The survey equals that of a serial run: $(cat state/surveyed)"

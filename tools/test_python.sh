@@ -5,7 +5,8 @@
 # oldest and the newest of those found alone, unless PYTHONS is given; what takes minutes and is the same under every
 # Python, comparing with the command's own files, is then tested under the newest alone.
 # MATEVAL_WHEELS=FOLDER builds nothing: it tests the wheel for this processor in FOLDER, whose own command then makes the
-# dataset.
+# dataset. MATEVAL_TORCH=1 also tests mateval.torch with Debian's PyTorch, which it installs: 150 MB of downloads, 650 MB
+# on disk. (PyPI's wheels for Linux on x86_64 hold CUDA: gigabytes.)
 set -eu
 cd "$(dirname "$0")/.."
 tools/apt_install.sh python3-venv
@@ -62,6 +63,7 @@ if [ "${MATEVAL_PROFILE:-}" = dev ] && [ -z "${PYTHONS:-}" ]; then
     found=$(printf '%s\n' $found | sed -n '1p; 1!{$p}')
     newest=$(printf '%s\n' $found | tail -n 1)
 fi
+export MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$dist"
 tested=0
 for python in $found; do
     "$python" --version
@@ -69,7 +71,18 @@ for python in $found; do
     [ "${newest:-$python}" = "$python" ] || fewer="not is_the_commands"
     "$python" -m venv "$work/env$tested"
     "$work/env$tested/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl pytest mypy trimesh pandas nbclient ipykernel
-    MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$dist" \
-        "$work/env$tested/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests ${fewer:+-k "$fewer"} "$@"
+    "$work/env$tested/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests ${fewer:+-k "$fewer"} "$@"
     tested=$((tested + 1))
 done
+
+if [ -n "${MATEVAL_TORCH:-}" ]; then
+    tools/apt_install.sh python3-torch
+    # Debian's torch is for Debian's own Python only.
+    /usr/bin/python3 -m venv --system-site-packages "$work/torch"
+    "$work/torch/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl pytest
+    # Without it the tests would be skipped.
+    "$work/torch/bin/python" -c 'import torch; print("PyTorch", torch.__version__)'
+    "$work/torch/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests/test_torch.py
+else
+    echo "mateval.torch was not tested with PyTorch; MATEVAL_TORCH=1 does"
+fi

@@ -84,6 +84,22 @@ def make_few(folder: Path) -> Path:
     return folder / "site"
 
 
+def make_curves(folder: Path) -> Path:
+    """A method on true and on moved furniture, and another method, with wide views and twins: all pages with curves."""
+    scenes = results.scene_names(3)
+    paths = []
+    for at, (method, psnr, level) in enumerate([("one", 25.0, 0), ("one", 22.0, 1), ("one", 18.0, 2), ("two", 20.0, 0)]):
+        said = {"geometry": {"kind": "pose", "level": level}} if level else {}
+        result = results.result(method=method, psnr=psnr, scenes=scenes, seed=at, **said)
+        results.add_wide_views(result, psnr=psnr)
+        results.add_constancy(result, ratio=0.25 * (at + 1))
+        path = folder / f"{at}.json"
+        path.write_text(results.pretty(result))
+        paths.append(path)
+    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", folder / "site"], check=True, stdout=subprocess.DEVNULL)
+    return folder / "site"
+
+
 RECIPE = """name = "sample"
 resolution = [96, 72]
 atlas_size = 128

@@ -53,6 +53,7 @@ class TestDocs(unittest.TestCase):
                 "albedo.novel.psnr": "PROTOCOL.html",
                 "mateval eval score": "commands/eval.html",
                 "half_pixel_m": "keys/scene.html",
+                "blenderproc_compat": "keys/recipe.html",
                 "unproject": "python.html",
             }.items():
                 with self.subTest(words):

@@ -12,6 +12,7 @@ use mateval_testkit::kept_folder;
 use super::command::{Run, baseline, build, render_photos, run};
 use super::lifting::base_colors;
 use super::sample::{files_below, json, write_source};
+use super::schemas::breaches;
 
 /// The sample's room with its input view alone, rendered by the built-in tracer.
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
@@ -59,6 +60,7 @@ fn the_page_shows_its_pictures() {
     );
     let lights = json(&PICTURES.join("room/lights.json"));
     assert_eq!(lights["format"], "mateval-fitted-lights/2");
+    assert_eq!(breaches("fitted_lights", &lights), Vec::<String>::new());
     let names: Vec<&str> =
         lights["lights"].as_array().unwrap().iter().filter_map(|light| light["name"].as_str()).collect();
     assert!(names.contains(&"lamp_shade") && names.contains(&"world_3"), "{names:?}");

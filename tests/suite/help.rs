@@ -73,6 +73,22 @@ fn unknown_arguments() {
     }
 }
 
+/// Both end up in files that other programs read.
+#[test]
+fn names_and_addresses_for_the_hub_are_checked() {
+    for (dataset, url, expected) in [
+        ("rooms", "https://example.org", "expected OWNER/NAME"),
+        ("a/b/c", "https://example.org", "expected OWNER/NAME"),
+        ("a/\"b", "https://example.org", "expected OWNER/NAME"),
+        ("a/b", "example.org", "begins with https://"),
+        // The twin is sound, and there is no result.
+        ("a/b", "https://example.org", "cannot read 'r.json'"),
+    ] {
+        let words = ["eval", "leaderboard", "r.json", "--out", "o", "--hub-dataset", dataset, "--url", url];
+        run(mateval().args(words)).ends_with(2).says(expected);
+    }
+}
+
 /// Memory and time grow with the samples, so a typing error must not ask for a thousand million.
 #[test]
 fn samples_have_a_bound() {

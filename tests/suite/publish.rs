@@ -10,6 +10,7 @@ use mateval_image::{Picture, png_io};
 use mateval_testkit::{copy_folder, kept_folder};
 
 use super::command::{Run, baseline, build, mateval, render, run, run_words, score, verify};
+use super::leaks::{Secrets, check_bytes, contents};
 use super::sample::{SMALL, copy_source, dataset, files_below, json, manifest, recipe_text, unrendered};
 
 /// `mateval prep publish DATASET --withhold ground_truth` into folders of `out`, with further words.
@@ -39,6 +40,8 @@ static SPLIT: LazyLock<PathBuf> = LazyLock::new(|| {
     folder
 });
 
+static SECRETS: LazyLock<Secrets> = LazyLock::new(|| Secrets::of(&SPLIT.join("private")));
+
 /// The baseline `grey`, made from the public tree, and its result on the whole one.
 static GREY: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
     let folder = kept_folder("split-grey");
@@ -50,15 +53,6 @@ static GREY: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
 
 fn commitment(run: &Run) -> &str {
     run.stdout.lines().find_map(|line| line.strip_prefix("commitment ")).unwrap()
-}
-
-/// The bytes of every file below a folder.
-fn contents(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    files_below(root).into_iter().map(|file| (file.clone(), std::fs::read(root.join(file)).unwrap())).collect()
-}
-
-fn holds(text: &[u8], part: &[u8]) -> bool {
-    text.windows(part.len()).any(|window| window == part)
 }
 
 #[test]
@@ -138,29 +132,12 @@ fn nothing_withheld_can_be_made_again_without_the_key() {
 /// size, nor a piece of its content.
 #[test]
 fn the_public_tree_holds_no_hash_size_or_piece_of_a_withheld_file() {
-    let public = contents(&SPLIT.join("public"));
-    let unrelated = contents(unrendered());
-    let texts: Vec<u8> = public
-        .iter()
-        .filter(|(file, _)| file.extension().is_none_or(|ending| ending == "json" || ending == "sha256"))
-        .flat_map(|(_, bytes)| bytes.clone())
-        .collect();
-    let mut pieces = 0;
-    // The photo is a render, and public.
-    let is_photo = |file: &Path| file.to_string_lossy().contains("/input/rgb.");
-    for (file, bytes) in contents(&SPLIT.join("private")).into_iter().filter(|(file, _)| !is_photo(file)) {
-        assert!(!public.iter().any(|(_, other)| *other == bytes), "{file:?} is public");
-        assert!(!holds(&texts, sha256_of_bytes(&bytes).as_bytes()), "the hash of {file:?} is public");
-        let is_map = file.ends_with("base_color.png");
-        assert!(!is_map || !holds(&texts, format!(": {}", bytes.len()).as_bytes()), "the size of {file:?} is public");
-        // From the middle of each map, past what all PNG files begin with.
-        let piece = &bytes[bytes.len() / 2..][..16.min(bytes.len() / 2)];
-        if is_map && piece.len() == 16 && !unrelated.iter().any(|(_, other)| holds(other, piece)) {
-            pieces += 1;
-            assert!(!public.iter().any(|(_, other)| holds(other, piece)), "a piece of {file:?} is public");
-        }
-    }
+    let [public, private] = ["public", "private"].map(|name| SPLIT.join(name));
+    let pieces = check_bytes(&public, &private, unrendered());
     assert!(pieces >= 4, "{pieces}");
+    let shown = SECRETS.found_in(&public);
+    assert_eq!(shown.leaks, BTreeSet::new());
+    assert!(shown.pictures > 20, "{}", shown.pictures);
 }
 
 /// The scoring program of a competition, on the layout that Codabench documents: its files give no more away than
@@ -204,6 +181,9 @@ fn a_competition_shows_rounded_numbers_alone() {
         .args(["rounded", "mateval-3"]);
     let printed = run(program.arg(app.join("input")).arg(&output)).ends_with(0).stdout;
     assert_eq!((printed.as_str(), files_below(&output).len()), ("", 2));
+    assert_eq!(SECRETS.found_in(&output).leaks, BTreeSet::new());
+    // The twin holds the truth, for the scoring program.
+    assert!(!SECRETS.found_in(&bundle).leaks.is_empty());
 
     let [whole, rounded] = ["whole.json", "rounded.json"].map(|name| out.path().join(name));
     let mut command = score(&app.join("input/res/folder"), &SPLIT.join("whole"), &whole);
@@ -218,11 +198,12 @@ fn a_competition_shows_rounded_numbers_alone() {
         let exact = format!("{:.4}", whole[key].as_f64().unwrap());
         assert!(page.contains(key) && !page.contains(&exact), "{key}");
     }
-    assert!(!page.contains("<img") && !page.contains("\"instances\""), "{page}");
+    // An interval is a further number, which would give more away.
+    assert!(!page.contains("<img") && !page.contains("\"instances\"") && !page.contains("interval"), "{page}");
 }
 
-/// A box with one photo and one measured colour, below `folder`, as a dataset.
-fn captured_box(folder: &Path) -> PathBuf {
+/// A box with one photo and one measured colour, below `folder`, as a dataset. `more` follows in the recipe.
+fn captured_box(folder: &Path, more: &str) -> PathBuf {
     let corner = |at: u32| [(at & 1) as i32 * 4 - 2, (at >> 1 & 1) as i32 * 3, (at >> 2) as i32 * 3 - 2];
     let vertices: String = (0..8).map(corner).map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
     let faces = "4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n4 0 2 3 1\n4 4 5 7 6\n";
@@ -236,11 +217,16 @@ fn captured_box(folder: &Path) -> PathBuf {
         "value": 1, "color": [0.5, 0.4, 0.3]}]}"#;
     let recipe = "name = \"box\"\nresolution = [32, 24]\natlas_size = 64\n[[scene]]\nid = \"box\"\n[scene.capture]\n\
                   mesh = \"mesh.ply\"\ncameras = \"cameras.json\"\nphotos = \"images\"\ninput = \"1\"\n\
-                  measured = \"measured.json\"\n";
+                  measured = \"measured.json\"\n"
+        .to_owned()
+        + more;
     std::fs::create_dir_all(folder.join("images")).unwrap();
-    for (file, text) in
-        [("mesh.ply", mesh.as_str()), ("cameras.json", cameras), ("measured.json", measured), ("recipe.toml", recipe)]
-    {
+    for (file, text) in [
+        ("mesh.ply", mesh.as_str()),
+        ("cameras.json", cameras),
+        ("measured.json", measured),
+        ("recipe.toml", recipe.as_str()),
+    ] {
         std::fs::write(folder.join(file), text).unwrap();
     }
     let photo = Picture::from_fn(32, 24, |x, y| [120 + x as u8, 110 + y as u8, 90]);
@@ -257,7 +243,7 @@ fn captured_box(folder: &Path) -> PathBuf {
 fn a_competition_of_captured_rooms_scores_measured_colours() {
     let out = tempfile::tempdir().unwrap();
     let [bundle, app, output] = ["bundle", "app", "app/output"].map(|name| out.path().join(name));
-    let dataset = captured_box(&out.path().join("box"));
+    let dataset = captured_box(&out.path().join("box"), "");
     let mut command = mateval();
     let words = ["prep", "export", "--as", "codabench", "--image", "example/mateval:1", "--out"];
     command.args(words).arg(&bundle).arg(&dataset);
@@ -275,17 +261,33 @@ fn a_competition_of_captured_rooms_scores_measured_colours() {
     assert!(scores["measured_input_region_delta_e"].as_f64().is_some_and(|error| error > 1.0), "{scores}");
     let page = std::fs::read_to_string(output.join("detailed_results.html")).unwrap();
     assert!(page.contains("grey") && page.contains("PSNR") && !page.contains("<img"), "{page}");
+    let error = format!("{:.4}", scores["measured_input_region_delta_e"].as_f64().unwrap());
+    let line = page.lines().find(|line| line.starts_with("measured.input.region_delta_e")).unwrap();
+    assert!(line.ends_with(&format!(" {error}  no interval, houses: 1")), "{line}");
+}
+
+/// Tars state a flash in `scene.json`; formats of cameras and pictures alone refuse the scene.
+#[test]
+fn a_flash_is_exported_or_refused_by_name() {
+    let out = tempfile::tempdir().unwrap();
+    let dataset = captured_box(&out.path().join("box"), "flash = { offset_m = [0, 0.1, 0] }\n");
+    assert_eq!(json(&dataset.join("scenes/box/scene.json"))["flash"]["views"], serde_json::json!(["input"]));
+    for (format, is_held) in [("tar", true), ("nerfstudio", false), ("colmap", false)] {
+        let place = out.path().join(format);
+        let mut command = mateval();
+        command.args(["prep", "export", "--with-ground-truth", "--as", format, "--out"]).arg(&place).arg(&dataset);
+        match is_held {
+            true => run(&mut command).ends_with(0),
+            false => run(&mut command).ends_with(2).says("the scene 'box' has a flash"),
+        };
+        assert_eq!(place.exists(), is_held, "{format}");
+    }
 }
 
 /// Fault 4: the next step of the guide packed the whole dataset without a word.
 #[test]
 fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
     let out = tempfile::tempdir().unwrap();
-    // The ends of maps that are no constants: a single colour may occur anywhere.
-    let maps = contents(&SPLIT.join("private")).into_iter();
-    let maps: Vec<_> =
-        maps.filter(|(file, bytes)| file.ends_with("base_color.png") && bytes.len() > 4000).take(3).collect();
-    assert_eq!(maps.len(), 3);
     for (at, format) in ["tar", "croissant", "huggingface", "nerfstudio", "colmap"].into_iter().enumerate() {
         let export = |dataset: &str| {
             let place = out.path().join(format!("{dataset}-{at}"));
@@ -301,10 +303,16 @@ fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
         }
         let (mut command, place) = export("public");
         run(&mut command).ends_with(0);
-        for (file, bytes) in contents(&place) {
-            assert!(!maps.iter().any(|(_, map)| holds(&bytes, &map[map.len() - 64..])), "{file:?}");
-        }
+        let shown = SECRETS.found_in(&place);
+        assert_eq!(shown.leaks, BTreeSet::new(), "{format}");
+        assert!(shown.pictures > 0, "{format}");
     }
+    // The twin: what is packed on request is found.
+    let packed = out.path().join("with_truth");
+    let mut command = mateval();
+    command.args(["prep", "export", "--as", "tar", "--with-ground-truth", "--out"]).arg(&packed);
+    run(command.arg(SPLIT.join("whole"))).ends_with(0);
+    assert!(SECRETS.found_in(&packed).leaks.len() > 20);
     let report = out.path().join("report");
     let words = |dataset: &str| {
         let mut command = mateval();
@@ -315,32 +323,39 @@ fn nothing_passes_on_the_truth_of_a_hidden_split_without_being_asked() {
     run(&mut words("public")).ends_with(0);
     let text = std::fs::read_to_string(report.join("release.json")).unwrap();
     assert!(text.contains("\"secrecy\": \"secret\"") && text.contains("\"remake\": null"), "{text}");
+    assert_eq!(SECRETS.found_in(&report).leaks, BTreeSet::new());
 }
 
 /// A folder of pictures of the truth was copied into a site that everybody sees.
 #[test]
 fn a_board_of_a_hidden_split_shows_its_truth_only_if_asked() {
     let out = tempfile::tempdir().unwrap();
-    let [_, result] = &*GREY;
+    let [grey, result] = &*GREY;
     let [set, site] = ["set", "site"].map(|name| out.path().join(name));
     let board = |words: &[&str]| {
         let mut command = mateval();
         run(command.args(["eval", "leaderboard"]).arg(result).arg("--out").arg(&site).args(words))
     };
-    for method in ["grey", "_truth"] {
+    let withheld = SPLIT.join("private/scenes/room/ground_truth/renders/builtin/up_left/rgb.png");
+    for (method, picture) in [("grey", grey.join("scenes/room/floor/base_color.png")), ("_truth", withheld)] {
         let folder = set.join(method).join("room/input");
         std::fs::create_dir_all(&folder).unwrap();
-        std::fs::write(folder.join("albedo.png"), method).unwrap();
+        std::fs::copy(picture, folder.join("albedo.png")).unwrap();
     }
     let pictures = ["--pictures", set.to_str().unwrap()];
     board(&pictures).ends_with(2).says("_truth/room/input/albedo.png").says("--with-ground-truth");
     board(&["--with-ground-truth"]).ends_with(2);
     assert!(!site.exists());
     board(&[&pictures[..], &["--with-ground-truth"]].concat()).ends_with(0);
+    let shown = SECRETS.found_in(&site);
+    assert!(shown.leaks.iter().any(|(file, _)| file.ends_with("_truth/room/input/albedo.png")), "{:?}", shown.leaks);
     // The twin shows what everybody may see.
     std::fs::remove_dir_all(set.join("_truth")).unwrap();
     board(&[&pictures[..], &["--force"]].concat()).ends_with(0);
     assert!(site.join("pictures/grey/room/input/albedo.png").exists() && !site.join("pictures/_truth").exists());
+    let shown = SECRETS.found_in(&site);
+    assert_eq!(shown.leaks, BTreeSet::new());
+    assert!(shown.pictures > 0);
 }
 
 #[test]

@@ -202,27 +202,123 @@ fn keys_that_are_no_secret_are_refused() {
     refused("redress = { key = \"../key\" }\nphoto = \"a.png\"", "`redress` changes the room");
 }
 
+/// A glTF file of a textured floor and a plain cushion above it, with its files beside it.
+fn write_gltf(folder: &Path) {
+    let square = |from: f32, to: f32, y: f32| [[from, y, from], [from, y, to], [to, y, to], [to, y, from]].concat();
+    let uv = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0];
+    let floats = [square(0.0, 2.0, 0.0), uv.to_vec(), square(0.5, 1.5, 0.5)].concat();
+    let corners = [0_u16, 1, 2, 0, 2, 3];
+    let bytes =
+        floats.iter().flat_map(|value| value.to_le_bytes()).chain(corners.iter().flat_map(|at| at.to_le_bytes()));
+    std::fs::write(folder.join("room.bin"), bytes.collect::<Vec<u8>>()).unwrap();
+    let checks = |x: usize, y: usize| if (x + y).is_multiple_of(2) { [120, 90, 60] } else { [90, 60, 30] };
+    png_io::write_rgb_bytes(&folder.join("checks.png"), &Picture::from_fn(8, 8, checks)).unwrap();
+    let view = |at: usize, length: usize| serde_json::json!({ "buffer": 0, "byteOffset": at, "byteLength": length });
+    let places = |view: usize, from: [f32; 3], to: [f32; 3]| {
+        let kind = "VEC3";
+        serde_json::json!({ "bufferView": view, "componentType": 5126, "count": 4, "type": kind, "min": from, "max": to })
+    };
+    let file = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0, 1] }],
+        "nodes": [{ "name": "floor", "mesh": 0 }, { "name": "cushion", "mesh": 1 }],
+        "meshes": [
+            { "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 3, "material": 0 }] },
+            { "primitives": [{ "attributes": { "POSITION": 2 }, "indices": 3, "material": 1 }] },
+        ],
+        "materials": [
+            { "name": "Wood", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "metallicFactor": 0 } },
+            { "name": "Fabric", "pbrMetallicRoughness": { "baseColorFactor": [0.8, 0.2, 0.1, 1], "metallicFactor": 0 } },
+        ],
+        "textures": [{ "source": 0 }],
+        "images": [{ "uri": "checks.png" }],
+        "accessors": [
+            places(0, [0.0, 0.0, 0.0], [2.0, 0.0, 2.0]),
+            { "bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2" },
+            places(2, [0.5, 0.5, 0.5], [1.5, 0.5, 1.5]),
+            { "bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR" },
+        ],
+        "bufferViews": [view(0, 48), view(48, 32), view(80, 48), view(128, 12)],
+        "buffers": [{ "byteLength": 140, "uri": "room.bin" }],
+    });
+    std::fs::write(folder.join("room.gltf"), file.to_string()).unwrap();
+}
+
+/// A glTF file names no classes: they follow from the names of materials and objects. The twin has the same key.
+#[test]
+fn a_gltf_scene_has_other_maps_and_the_same_geometry() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("source");
+    std::fs::create_dir(&source).unwrap();
+    write_gltf(&source);
+    let built = |name: &str, redress: &str| {
+        let camera = "{ position = [1.0, 1.8, 3.5], target = [1.0, 0.0, 1.0], fov_y_deg = 50.0 }";
+        let text = format!(
+            "name = \"gltf\"\nresolution = [64, 48]\natlas_size = 64\nviews = []\n[[scene]]\nid = \"room\"\n\
+             gltf = \"room.gltf\"\nallow_unstated = true\ncamera = {camera}\n{redress}\n"
+        );
+        std::fs::write(source.join("recipe.toml"), text).unwrap();
+        let dataset = folder.path().join(name);
+        run(&mut build(&source.join("recipe.toml"), &dataset)).ends_with(0);
+        run(&mut verify(&dataset)).ends_with(0);
+        dataset.join("scenes/room")
+    };
+    let private = |word: &str| BUILT.join(word).canonicalize().unwrap().display().to_string();
+    let key = format!("key = \"{}\"", private("key"));
+    let [original, first, again, tiled] = [
+        ("original", String::new()),
+        ("first", format!("redress = {{ {key} }}")),
+        ("again", format!("redress = {{ {key} }}")),
+        ("tiled", format!("redress = {{ {key}, materials = \"{}\" }}", private("materials"))),
+    ]
+    .map(|(name, redress)| built(name, &redress));
+    let bytes = |scene: &Path, file: &str| std::fs::read(scene.join(file)).unwrap();
+    for instance in ["floor", "cushion"] {
+        let map = format!("ground_truth/materials/{instance}/base_color.png");
+        let maps: BTreeSet<Vec<u8>> = [&original, &first, &tiled].map(|scene| bytes(scene, &map)).into();
+        assert_eq!(maps.len(), 3, "{instance}");
+        assert_eq!(bytes(&first, &map), bytes(&again, &map), "{instance}");
+    }
+    for file in ["views/input/depth.exr", "views/input/instance.png", "views/input/part.png"] {
+        for scene in [&first, &tiled] {
+            assert_eq!(bytes(&original, file), bytes(scene, file), "{file}");
+        }
+    }
+    let scene = json(&first.join("scene.json"));
+    assert_eq!(scene["source"]["kind"], "gltf");
+    assert_eq!(scene["source"]["states_roughness"], true);
+    assert_eq!(scene["redressed"]["weak"].as_array().unwrap().len(), 0);
+}
+
+/// The recipe names key and materials by paths that lead there from any folder.
 #[test]
 fn surveys_write_redressed_scenes() {
     let (source, folder) = (BUILT.join("source"), tempfile::tempdir().unwrap());
-    let survey = |key: &Path| {
+    let survey = |key: &Path, materials: Option<&Path>| {
         let mut command = mateval();
-        command.args([
-            "prep",
-            "survey",
-            "house/3D-FRONT",
-            "--models",
-            "house/3D-FUTURE-model",
-            "--cameras-per-room",
-            "1",
-        ]);
-        command.args(["--resolution", "64", "48", "--source"]).arg(&source).arg("--redress").arg(key);
+        command.args(["prep", "survey", "house/3D-FRONT", "--models", "house/3D-FUTURE-model"]);
+        command.args(["--cameras-per-room", "1", "--resolution", "64", "48", "--force"]);
+        command.arg("--source").arg(&source).arg("--redress").arg(key);
+        if let Some(materials) = materials {
+            command.arg("--redress-materials").arg(materials);
+        }
         run(command.arg("--out").arg(folder.path().join("survey")))
     };
-    survey(&source.join("recipe.toml")).ends_with(2).says("which may be published");
-    survey(&BUILT.join("key")).ends_with(0);
-    let recipe = std::fs::read_to_string(folder.path().join("survey/recipe.toml")).unwrap();
-    let key = BUILT.join("key").canonicalize().unwrap();
-    let count = recipe.matches(&format!("redress = {{ key = \"{}\" }}", key.display())).count();
-    assert!(count > 0 && count == recipe.matches("[[scene]]").count(), "{recipe}");
+    let key = BUILT.join("key");
+    survey(&source.join("recipe.toml"), None).ends_with(2).says("which may be published");
+    survey(&key, Some(source.join("room").as_path())).ends_with(2).says("which may be published");
+    survey(&key, Some(folder.path())).ends_with(2).says("holds no material");
+    assert!(!folder.path().join("survey").exists());
+    let materials = BUILT.join("materials");
+    let [key_shown, materials_shown] = [&key, &materials].map(|path| path.canonicalize().unwrap());
+    let [key_shown, materials_shown] = [key_shown.display(), materials_shown.display()];
+    for (given, expected) in [
+        (None, format!("redress = {{ key = \"{key_shown}\" }}\n")),
+        (Some(&materials), format!("redress = {{ key = \"{key_shown}\", materials = \"{materials_shown}\" }}\n")),
+    ] {
+        survey(&key, given.map(PathBuf::as_path)).ends_with(0);
+        let recipe = std::fs::read_to_string(folder.path().join("survey/recipe.toml")).unwrap();
+        let count = recipe.matches(&expected).count();
+        assert!(count > 0 && count == recipe.matches("[[scene]]").count(), "{recipe}");
+    }
 }

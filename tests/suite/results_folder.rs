@@ -43,7 +43,8 @@ fn the_workflow_builds_the_board_and_refuses_a_changed_result() {
     // A ceiling that anybody may have written is none.
     run_workflow(folder.path()).ends_with(2).says("unverified_ceiling");
     verify(folder.path(), "ceiling", "gt");
-    run_workflow(folder.path()).ends_with(0);
+    let silent = "the page 'About' states no contact, licence, paper or date";
+    run_workflow(folder.path()).ends_with(0).says(silent);
     let board = json(&folder.path().join("site/downloads/leaderboard.json"));
     assert_eq!(board["methods"].as_array().unwrap().len(), 1);
     assert_eq!(board["methods"][0]["verified"], "claimed");
@@ -53,7 +54,9 @@ fn the_workflow_builds_the_board_and_refuses_a_changed_result() {
     std::fs::create_dir(results.join(".ipynb_checkpoints")).unwrap();
     std::fs::write(results.join("._grey.json"), "x").unwrap();
     std::fs::remove_dir_all(folder.path().join("site")).unwrap();
-    run_workflow(folder.path()).ends_with(0).says("skipped 'results/._grey.json'");
+    std::fs::write(results.join("about.md"), "Contact: keeper@example.org").unwrap();
+    let done = run_workflow(folder.path()).ends_with(0).says("skipped 'results/._grey.json'");
+    assert!(!done.stderr.contains(silent), "{}", done.stderr);
     let board = json(&folder.path().join("site/downloads/leaderboard.json"));
     assert_eq!(board["methods"][0]["verified"], "confirmed");
     assert_eq!(board["ceiling"]["method"], "gt");

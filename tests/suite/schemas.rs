@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use mateval_baselines::adapter::Adapter;
+use mateval_baselines::delight::FittedLightsFile;
 use mateval_baselines::encoding_report::EncodingReport;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_dataset::dataset::{DatasetFile, SceneFile, TargetsFile};
@@ -16,9 +18,11 @@ use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender_job::{BlenderJob, BlenderResult};
 use mateval_prep::compare::file::CompareFile;
+use mateval_prep::recipe::Recipe;
 use mateval_prep::stats::StatsFile;
 use mateval_prep::stats::findings::FindingsFile;
 use mateval_prep::survey::SurveyFile;
+use mateval_prep::survey::rules::SelectionRules;
 use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::entries::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
@@ -26,8 +30,9 @@ use mateval_report::release::ReleaseFile;
 use mateval_report::rounded::RoundedFile;
 use mateval_report::votes::{Preferences, VotesFile};
 use mateval_submission::lint::LintFile;
+use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{Schema, schema_for};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// The command that updates the schemas.
 const FIX: &str = "MATEVAL_WRITE_SCHEMAS=1 cargo test --test suite schemas_are_those_of_the_types";
@@ -42,9 +47,12 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap())).collect()
 }
 
-/// The JSON Schema of every kind of JSON file, made from the Rust type that reads and writes it.
-fn schemas() -> [(&'static str, Schema); 32] {
+/// The JSON Schema of every kind of JSON and TOML file, made from the Rust type that reads and writes it.
+fn schemas() -> [(&'static str, Schema); 36] {
     [
+        ("recipe", of_toml(schema_for!(Recipe))),
+        ("survey_rules", of_toml(schema_for!(SelectionRules))),
+        ("adapter", of_toml(schema_for!(Adapter))),
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
         ("scene", schema_for!(SceneFile)),
@@ -75,9 +83,34 @@ fn schemas() -> [(&'static str, Schema); 32] {
         ("compare", schema_for!(CompareFile)),
         ("compare_verdict", schema_for!(VerdictFile)),
         ("encoding", schema_for!(EncodingReport)),
+        ("fitted_lights", schema_for!(FittedLightsFile<'static>)),
         ("import", schema_for!(ImportReport)),
         ("import_materials", schema_for!(FlatMaterials)),
     ]
+}
+
+/// The schema of a TOML file: without null, which TOML does not have.
+fn of_toml(mut schema: Schema) -> Schema {
+    RecursiveTransform(without_null).transform(&mut schema);
+    schema
+}
+
+fn without_null(schema: &mut Schema) {
+    for (key, null) in [("type", json!("null")), ("anyOf", json!({ "type": "null" }))] {
+        let Some(Value::Array(options)) = schema.get_mut(key) else { continue };
+        options.retain(|option| *option != null);
+        let [only] = &options[..] else { continue };
+        match only.clone() {
+            // The keys of the only object stand beside those of `anyOf`, such as its description.
+            Value::Object(inner) => {
+                schema.remove(key);
+                schema.ensure_object().extend(inner);
+            }
+            only => {
+                schema.insert(key.to_owned(), only);
+            }
+        }
+    }
 }
 
 /// The schemas as files, by name.
@@ -123,8 +156,8 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// The violations of the schema with the example's name.
-fn breaches(name: &str, example: &Value) -> Vec<String> {
+/// The violations of a schema.
+pub(super) fn breaches(name: &str, example: &Value) -> Vec<String> {
     let schema = json(&spec(&format!("schema/{name}.schema.json")));
     let validator = jsonschema::validator_for(&schema).unwrap();
     validator.iter_errors(example).map(|error| format!("{}: {error}", error.instance_path())).collect()
@@ -156,6 +189,51 @@ fn the_example_recipe_can_be_read() {
     let path = folder.path().join("recipe.toml");
     std::fs::write(&path, text.replace("samples", "sample_count")).unwrap();
     assert!(mateval_prep::recipe::read(&path).is_err());
+}
+
+#[test]
+fn schemas_of_toml_files_allow_what_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recipe.toml");
+    let room = "front3d = { house = 'h.json', room = 'R-1', models = 'm' }\ncamera = { seed = 1 }";
+    let capture = "capture = { mesh = 'm.ply', cameras = 'c.json', photos = 'p', input = '1', measured = 'm.json' }";
+    let unknown = "gltf = 'a.glb'\nexposures = 1";
+    let twins = "gltf = 'a.glb'\ntwins = ['alone_1']";
+    for (is_sound, above, scene) in [
+        (true, "", "bitterli = 'a.xml'"),
+        (true, "wide = { count = 4, distance_m = [0.3, 1] }\nlicences = { gltf = 'CC0-1.0' }", twins),
+        (true, "wide = { views = [{ id = 'wide_1', offset_m = [1, 0, 0] }] }", room),
+        (true, "views = []\nresolution = [16, 8192]\ncamera_rules = '3dlg'", capture),
+        (false, "samples = 0", twins),
+        (false, "atlas_size = 63", twins),
+        (false, "resolution = [15, 16]", twins),
+        (false, "wide = { count = 17, distance_m = [0.3, 1] }", twins),
+        (false, "wide = { count = 1, distance_m = [0.01, 1] }", twins),
+        (false, "views = [{ id = 'up', x_deg = 91, y_deg = 0 }]", twins),
+        (false, "camera_rules = 'mine'", twins),
+        (false, "licence = 'CC0-1.0'", twins),
+        (false, "", "gltf = 'a.glb'\ntwins = ['alone_0']"),
+        (false, "", unknown),
+    ] {
+        let text = format!("name = 'x'\n{above}\n[[scene]]\nid = 'a'\n{scene}\n");
+        std::fs::write(&path, &text).unwrap();
+        assert_eq!(mateval_prep::recipe::read(&path).is_ok(), is_sound, "{text}");
+        assert_eq!(breaches("recipe", &toml::from_str(&text).unwrap()).is_empty(), is_sound, "{text}");
+    }
+    assert_eq!(breaches("recipe", &json!({ "name": "x" })).len(), 1, "a recipe has a scene");
+    let mut seen = 0;
+    for (name, bytes) in files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/baselines/adapters")) {
+        let Some(adapter) = name.strip_suffix(".toml") else { continue };
+        let text = String::from_utf8(bytes).unwrap();
+        assert_eq!(breaches("adapter", &toml::from_str(&text).unwrap()), Vec::<String>::new(), "{adapter}");
+        // The twin.
+        let unknown = text.replace("encoding = ", "transfer = ");
+        assert!(!breaches("adapter", &toml::from_str(&unknown).unwrap()).is_empty(), "{adapter}");
+        seen += 1;
+    }
+    assert_eq!(seen, Adapter::names().len());
+    assert_eq!(breaches("survey_rules", &json!({ "min_objects": 7 })), Vec::<String>::new());
+    assert_eq!(breaches("survey_rules", &json!({ "min_object": 7 })).len(), 1);
 }
 
 fn near(found: [f64; 3], expected: [f64; 3], slack: f64) -> bool {

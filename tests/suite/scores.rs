@@ -145,6 +145,19 @@ fn tables_show_both_and_refuse_other_fingerprints() {
     run(mateval().args(["eval", "tables"]).arg(other)).ends_with(0);
 }
 
+/// The last line of stderr, for whoever sizes a queue; the result states no time.
+#[test]
+fn scoring_states_what_it_cost() {
+    let line = SCORED.run_of_grey.stderr.lines().last().unwrap();
+    let start = "1 submission scored on 1 scene in ";
+    assert!(line.starts_with(start) && line.contains(" s for the slowest, 'room'; "), "{line}");
+    assert!(line.ends_with(" s of processor time"), "{line}");
+    // Processor time is measured in hundredths of a second.
+    let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok()).collect::<Vec<_>>();
+    let [_, _, wall, per_scene, slowest, processor] = numbers[..] else { panic!("{line}") };
+    assert!(wall > 0.0 && per_scene == wall && slowest <= wall && processor > 0.0, "{line}");
+}
+
 #[test]
 fn lpips_without_weights_is_missing_and_names_the_fix() {
     const FIX: &str = "mateval fetch lpips";

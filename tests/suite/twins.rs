@@ -1,5 +1,5 @@
-//! Twins of a scene: what they share with it, what their photos are, what is refused for them, and what the commands make
-//! of them.
+//! Twins of a scene: what they share with it, what their photos are, what is refused for them, and how commands treat
+//! them.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -178,6 +178,10 @@ fn twins_are_answered_and_refused_by_name() {
     run(mateval().args(["prep", "perturb", "--kind", "pose", "--level", "1", "--out"]).arg(&out).arg(&*DATASET))
         .ends_with(2)
         .says("has twins");
+    let out = folder.path().join("mitsuba");
+    run(mateval().args(["prep", "export", "--as", "mitsuba", "--scene", TWINS[0], "--out"]).arg(&out).arg(&*DATASET))
+        .ends_with(2)
+        .says("name 'room' instead");
     let camera = folder.path().join("cameras");
     run(mateval()
         .args(["prep", "export", "--as", "nerfstudio", "--with-ground-truth", "--out"])
@@ -185,6 +189,49 @@ fn twins_are_answered_and_refused_by_name() {
         .arg(&*DATASET))
     .ends_with(0);
     assert!(TWINS.iter().all(|id| camera.join(id).is_dir()));
+}
+
+/// Twins are published with their scene: their photos are public and their truth is not. Counts, pictures and pages are
+/// those of scenes alone.
+#[test]
+fn twins_are_published_with_their_scene_and_counted_nowhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    run(mateval()
+        .args(["prep", "publish", "--withhold", "ground_truth", "--open-book", "--public"])
+        .arg(place("public"))
+        .arg("--private")
+        .arg(place("private"))
+        .arg("--report")
+        .arg(place("report"))
+        .arg(&*DATASET))
+    .ends_with(0);
+    run(&mut verify(&place("public"))).ends_with(0);
+    for id in TWINS {
+        let [public, private] = ["public", "private"].map(|half| place(half).join("scenes").join(id));
+        assert!(public.join("views/input/rgb.exr").is_file() && !public.join("ground_truth").exists(), "{id}");
+        assert!(private.join("ground_truth").is_dir() && !private.join("views").exists(), "{id}");
+    }
+    assert_eq!(json(&place("report/release.json"))["scenes"].as_array().unwrap().len(), 1);
+    // Put together again, the halves are the dataset.
+    copy_folder(&place("private"), &place("public"));
+    run(&mut verify(&place("public"))).ends_with(0);
+    let stats = run(mateval().args(["prep", "stats", "--format", "json"]).arg(&*DATASET)).ends_with(0).stdout;
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&stats).unwrap()["scenes"], 1);
+    let grey = place("grey");
+    run(&mut baseline("grey", &DATASET, &grey)).ends_with(0);
+    run(mateval()
+        .args(["eval", "pictures"])
+        .arg(&grey)
+        .arg("--dataset")
+        .arg(&*DATASET)
+        .arg("--out")
+        .arg(place("pictures")))
+    .ends_with(0);
+    let pictures = files_below(&place("pictures"));
+    assert!(!pictures.is_empty() && pictures.iter().all(|file| !file.to_string_lossy().contains("--")), "{pictures:?}");
+    run(mateval().args(["prep", "export", "--as", "tar", "--out"]).arg(place("tars")).arg(&*DATASET)).ends_with(0);
+    assert!(TWINS.iter().all(|id| files_below(&place("tars")).iter().any(|file| file.to_string_lossy().contains(id))));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-"""Writes a table of keys for each JSON format, from the schemas in `dataset_spec/schema`.
+"""Writes a table of keys for each JSON and TOML format, from the schemas in `dataset_spec/schema`.
 
 A type that is used in one place is expanded there, under its path (`views[].camera.fx`). One that several places use has a
 table of its own: on the page of the format where all of its uses are, else on the page `shared.md`.
@@ -14,12 +14,12 @@ SCHEMAS = Path("dataset_spec/schema")
 
 #: The pages, by group, in the order of the menu.
 GROUPS = {
-    "Dataset": ["dataset", "targets", "scene", "compare_verdict"],
+    "Dataset": ["recipe", "dataset", "targets", "scene", "compare_verdict"],
     "Ground truth": ["reference", "source_materials", "lights", "material_classes", "render", "scorer", "measured", "measurements"],
     "Submissions and results": ["submission", "lint", "result", "rounded", "verification", "explain", "leaderboard", "errata", "votes",
                                 "preferences"],
-    "Reports of a dataset": ["survey", "stats", "findings", "compare", "release"],
-    "Baselines": ["encoding", "import", "import_materials"],
+    "Reports of a dataset": ["survey_rules", "survey", "stats", "findings", "compare", "release"],
+    "Baselines": ["adapter", "encoding", "fitted_lights", "import", "import_materials"],
     "Between MatEval and Blender": ["blender_job", "blender_result"],
 }
 #: What the end of a key states about a number or a text.
@@ -71,10 +71,12 @@ class Keys:
         return texts
 
     def index(self) -> str:
-        lines = ["# Keys", "", "The keys of every JSON file that MatEval reads or writes, from their "
+        lines = ["# Keys", "", "The keys of every JSON and TOML file that MatEval reads or writes, from their "
                  "schemas. [The chapters](../format/index.md) describe the files.", "",
                  "`list[].key` is a key of each object of a list, `map.<name>.key` one of each object that is found by a name. An "
-                 "*optional* key may be absent. A number of numbers, as in 3 × number, is a list of that length.", ""]
+                 "*optional* key may be absent, and so may one with a *default*, which it then has. A number of numbers, as in "
+                 "3 × number, is a list of that length. In TOML an object is a table, and a list of objects an array of tables, "
+                 "as in `[[scene]]`.", ""]
         for group, names in GROUPS.items():
             lines += [f"## {group}", "", "| Format | Content |", "|---|---|"]
             lines += [f"| [{name}]({name}.md) | {self.content(name)} |" for name in names] + [""]
@@ -128,7 +130,9 @@ class Keys:
                 if unit and re.search("number|integer|text", kind):
                     kind += f", {unit}"
                 if not all(required for _, required in those):
-                    kind += "<br>*optional*"
+                    # An empty default is that of an absent key.
+                    default = content.get("default") not in (None, "", [], {})
+                    kind += f"<br>*default* `{json.dumps(content['default'])}`" if default else "<br>*optional*"
                 meaning = [content.get("description") or self.below(content)]
                 if not content.get("description") and len(options) > 1 and "description" in those[0][0] and not tag:
                     meaning = [those[0][0]["description"]]
@@ -155,6 +159,8 @@ class Keys:
                 words = [f"`{one['const']}`" for one in target.get("oneOf", []) if "const" in one]
                 return " or ".join(["object", *words]), ("", name, None)
             return self.kind(target, page)
+        if words := node.get("enum"):
+            return " or ".join(f"`{word}`" for word in words), None
         if node.get("oneOf"):
             return "word", None
         kind = node.get("type")
@@ -171,7 +177,8 @@ class Keys:
         if kind == "string" and node.get("pattern"):
             return ("[id](../format/index.md#conventions)" if node["pattern"] == ID else f"text `{node['pattern']}`"), None
         if "minimum" in node and "maximum" in node:
-            return f"{kind}, {node['minimum']} to {node['maximum']}", None
+            least, most = (json.dumps(node[end]).removesuffix(".0") for end in ("minimum", "maximum"))
+            return f"{kind}, {least} to {most}", None
         return {"string": "text", "boolean": "true or false"}.get(kind, kind), None
 
     def below(self, node: dict) -> str:

@@ -1,8 +1,8 @@
 //! Measures the steps of `baseline nn`, and compares its nearest-point search with scipy's cKDTree.
 //!
-//! `cargo bench -p mateval-baselines --bench lifting -- DATASET [PYTHON]` lifts the ground truth of every scene to atlases
-//! of 1024 x 1024 texels and prints wall-clock seconds. With a Python that has scipy, the largest filling step is done by
-//! both programs in turn.
+//! `cargo bench -p mateval-baselines --bench lifting -- DATASET [PYTHON]` lifts the ground truth of every scene to
+//! atlases of 1024 x 1024 texels and prints wall-clock seconds. With a Python that has scipy, the largest filling step
+//! is done by both programs in turn.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 use std::io::Write as _;
@@ -12,13 +12,15 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 use mateval_baselines::estimate_source::EstimateSource;
-use mateval_baselines::fill::{FillRule, SeenCloud, fill};
+use mateval_baselines::fill::{FillRule, SeenCloud};
 use mateval_baselines::geometry::{SceneGeometry, SeenPoint};
 use mateval_baselines::lift::{PartialAtlas, Texel, lift, place_of};
 use mateval_baselines::maps::Maps;
 use mateval_baselines::nn::{self, NnOptions, seen_pixels};
+use mateval_dataset::TriangleMesh;
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
+use rayon::prelude::*;
 
 const SIZE: usize = 1024;
 const ROUNDS: usize = 3;
@@ -50,7 +52,7 @@ fn main() {
 struct Step {
     points: Vec<SeenPoint>,
     known: PartialAtlas,
-    mesh: mateval_dataset::TriangleMesh,
+    mesh: TriangleMesh,
 }
 
 impl Step {
@@ -102,12 +104,19 @@ fn room(dataset: &Dataset, scene: &SceneFile) -> ([f64; 6], Option<Step>) {
         if !cloud.is_empty() && largest.as_ref().is_none_or(|largest| step.unseen() > largest.unseen()) {
             largest = Some(step);
         }
-        if timed(&mut seconds[4], || fill(&cloud, &mut known, geometry.mesh(instance))) {
+        timed(&mut seconds[4], || fill(&cloud, &mut known, geometry.mesh(instance)));
+        if !cloud.is_empty() {
             let folder = folder.path().join(scene.instances[instance].id.as_str());
             timed(&mut seconds[5], || Maps::of_atlas(&known, estimate.given_maps()).write(&folder).unwrap());
         }
     }
     (seconds, largest)
+}
+
+fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) {
+    let atlas = &known.atlas;
+    let rows = known.texels.pixels_mut().par_chunks_mut(SIZE).enumerate();
+    rows.for_each(|(y, row)| cloud.fill_row(atlas, mesh, y, row));
 }
 
 fn copy(known: &PartialAtlas) -> PartialAtlas {

@@ -11,7 +11,8 @@ use mateval_files::untrusted::{hint, in_words, read_at_most, without_mark};
 use mateval_image::limits::read_file;
 use mateval_image::texture_io::{Encoding, FewerBits, is_turned, texture_and_alpha_of_bytes, transparent_share};
 use mateval_image::{LinearRgb, Picture, Wrap};
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Placement};
@@ -43,19 +44,23 @@ const PICTURES: [&str; 27] = [
 /// The deepest folder, below that of the estimates, in which such files are looked for.
 const DEEPEST: usize = 4;
 
-/// The pictures of a method.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// An adapter, a TOML file: the pictures of a method. It has at least one of `base_color`, `roughness` and `metallic`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adapter {
+    /// The adapter's name, as reports state it.
     pub name: String,
+    /// A description for people.
     #[serde(default)]
     pub about: String,
     /// How the pictures lie on the input view.
     #[serde(default)]
     pub placement: Placement,
+    /// The pictures of base colour; if absent, the method gives none.
     pub base_color: Option<AdaptedFile>,
-    /// Perceptual roughness.
+    /// The pictures of perceptual roughness; if absent, the method gives none.
     pub roughness: Option<AdaptedFile>,
+    /// The pictures of metallic; if absent, the method gives none.
     pub metallic: Option<AdaptedFile>,
 }
 
@@ -215,26 +220,27 @@ const LEAST: f32 = -0.1;
 const MOST_BELOW: f64 = 0.01;
 
 /// The files of one map.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptedFile {
-    /// Candidate paths below the folder of estimates; the first that exists is read. `{scene}` stands for the scene's
-    /// id.
+    /// Candidate paths below the folder of estimates, at least one; the first that exists is read. `{scene}` stands for
+    /// the scene's id.
+    #[schemars(length(min = 1))]
     pub files: Vec<String>,
-    /// Transfer function of the stored numbers.
+    /// Transfer function of the stored numbers, in files of every kind: PNG, JPEG, WebP, EXR and NumPy alike.
     pub encoding: StoredEncoding,
     /// Whether the method's authors state the encoding, in words or by code. Where they do not, submissions name it in
     /// `assumed_encodings`.
     #[serde(default = "stated")]
     pub encoding_stated: bool,
-    /// The stored numbers that stand for 0 and 1, after integers are divided by the largest value of their type.
+    /// The stored numbers that stand for 0 and 1, the smaller first, after integers are divided by the largest value of
+    /// their type.
     #[serde(default = "unit_range")]
     pub range: [f32; 2],
     /// Whether the values are known only up to a factor.
     #[serde(default)]
     pub scale: Scale,
     /// The channel that holds roughness or metallic; the first if absent. `base_color` must have none.
-    #[serde(default)]
     pub channel: Option<Channel>,
     /// Whether a scene may lack the file; it then has no such map.
     #[serde(default)]
@@ -249,7 +255,7 @@ fn unit_range() -> [f32; 2] {
     [0.0, 1.0]
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     R,
@@ -439,7 +445,7 @@ pub(crate) fn no_estimate(searched: &[PathBuf]) -> BaselineError {
 const FREE_SCALE_SHARE: f64 = 0.99;
 
 /// Whether values are known absolutely.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
     /// The values are used as they are.

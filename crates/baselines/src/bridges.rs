@@ -197,7 +197,7 @@ pub fn import_texgen(
             let maps = match known {
                 Some(mut lifted) => {
                     texture.iter().for_each(|texture| composite(&mut lifted, texture));
-                    Maps::of_atlas(&lifted.whole, estimate.given_maps())
+                    lifted.maps
                 }
                 None => Maps::constant(medians.of(&geometry, at), estimate.given_maps()),
             };
@@ -213,14 +213,14 @@ fn file(results: &Path, id: &str) -> PathBuf {
 
 /// Replaces the colour of every texel that was not seen by the texture's.
 fn composite(lifted: &mut nn::Lifted, texture: &Texture) {
-    let PartialAtlas { atlas, texels } = &mut lifted.whole;
-    let size = atlas.size();
-    for (at, texel) in texels.pixels_mut().iter_mut().enumerate() {
-        if let (Texel::Seen(values), false) = (texel, lifted.seen[at]) {
+    let size = lifted.atlas.size();
+    for (at, color) in lifted.maps.base_color.iter_mut().flat_map(Picture::pixels_mut).enumerate() {
+        if lifted.atlas.owner(at % size, at / size).is_some() && !lifted.seen.pixels()[at] {
             let uv = [at % size, size - 1 - at / size].map(|v| (v as f32 + 0.5) / size as f32);
-            values[..3].copy_from_slice(&texture.sample(uv));
+            *color = srgb_bytes(texture.sample(uv));
         }
     }
+    lifted.maps.fill_gutters(&lifted.atlas);
 }
 
 /// Largest file of labels that is read, in bytes.

@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::DVec2;
 use mateval_dataset::SceneId;
 use mateval_image::{LinearRgb, Picture};
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::error::BaselineError;
 
@@ -123,10 +124,10 @@ pub(crate) fn other_proportions(
 const PROPORTIONS: f64 = 0.05;
 
 /// How a picture lies on the input view.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Placement {
-    /// The picture shows the whole view and has its proportions, up to rounding.
+    /// The picture shows the whole view and has its proportions within 5 %; others are refused.
     #[default]
     Whole,
     /// The picture shows the whole view, stretched to other proportions.

@@ -8,13 +8,18 @@ use std::num::NonZero;
 
 use glam::{DVec2, DVec3};
 use mateval_dataset::TriangleMesh;
-use rayon::prelude::*;
-use rstar::RTree;
+use mateval_dataset::uv_atlas::UvAtlas;
 use rstar::primitives::GeomWithData;
+use rstar::{Point, PointDistance, RTree};
 
 use crate::estimate::Values;
 use crate::geometry::SeenPoint;
-use crate::lift::{PartialAtlas, Texel, place_of};
+use crate::lift::{Texel, place_of};
+
+/// The search for the point of a texel between two others ends at the distance of the nearer of their points if those
+/// two are at most this many texels apart. If they are farther apart, a sphere of that radius may hold more points than
+/// a search without a bound visits.
+const NEAR: usize = 16;
 
 /// How the values of an unseen texel are computed from seen points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,9 +45,12 @@ pub struct SeenCloud {
 
 /// A search in three dimensions is faster, so normals are stored only where they count.
 enum Tree {
-    Places(RTree<GeomWithData<[f32; 3], Values>>),
-    WithNormals(RTree<GeomWithData<[f32; 6], Values>>),
+    Places(RTree<Known<[f32; 3]>>),
+    WithNormals(RTree<Known<[f32; 6]>>),
 }
+
+/// A seen point with the values of the estimate.
+type Known<P> = GeomWithData<P, Values>;
 
 impl SeenCloud {
     /// Builds the tree of these points and values.
@@ -69,11 +77,23 @@ impl SeenCloud {
         }
     }
 
-    /// The values for a place of a surface with this normal; none without any points.
-    pub fn values_at(&self, place: DVec3, normal: DVec3) -> Option<Values> {
+    /// Gives every unseen texel of row `y` of an atlas the values of the seen points nearest to it. Changes nothing
+    /// without any points.
+    pub fn fill_row(&self, atlas: &UvAtlas, mesh: &TriangleMesh, y: usize, row: &mut [Texel]) {
+        let owner = |x: usize| atlas.owner(x, y);
+        let place =
+            |x: usize, triangle: usize| place_of(atlas, mesh, triangle, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
         match &self.tree {
-            Tree::Places(tree) => from_nearest(tree, place.as_vec3().to_array(), self.rule.neighbours),
-            Tree::WithNormals(tree) => from_nearest(tree, with_normal(self.rule, place, normal), self.rule.neighbours),
+            Tree::Places(tree) => {
+                let point = |x: usize, triangle: usize| place(x, triangle).as_vec3().to_array();
+                fill_row(tree, self.rule.neighbours, row, owner, point);
+            }
+            Tree::WithNormals(tree) => {
+                let point = |x: usize, triangle: usize| {
+                    with_normal(self.rule, place(x, triangle), mesh.geometric_normal(triangle))
+                };
+                fill_row(tree, self.rule.neighbours, row, owner, point);
+            }
         }
     }
 }
@@ -84,16 +104,109 @@ fn with_normal(rule: FillRule, place: DVec3, normal: DVec3) -> [f32; 6] {
     [place.x, place.y, place.z, normal.x, normal.y, normal.z]
 }
 
-fn from_nearest<P: rstar::Point<Scalar = f32>>(
-    tree: &RTree<GeomWithData<P, Values>>,
-    point: P,
+/// Fills the unseen texels of a row. `owner` returns the triangle of a texel and whether the texel's centre lies inside
+/// it; `point` returns the place of a texel, given its triangle, in the tree's space.
+fn fill_row<P: Point<Scalar = f32>>(
+    tree: &RTree<Known<P>>,
+    neighbours: NonZero<usize>,
+    row: &mut [Texel],
+    owner: impl Fn(usize) -> Option<(usize, bool)>,
+    point: impl Fn(usize, usize) -> P,
+) {
+    // The nearest point of the texel before, if that was filled too.
+    let mut before = None;
+    let mut first = 0;
+    while first < row.len() {
+        let Some((triangle, inside)) = owner(first).filter(|_| row[first] == Texel::Unseen) else {
+            (before, first) = (None, first + 1);
+            continue;
+        };
+        // The run of unseen texels of one triangle. A texel whose centre lies outside has the triangle's nearest place,
+        // which need not lie in line with those of its neighbours.
+        let in_line = |x: &usize| row[*x] == Texel::Unseen && owner(*x) == Some((triangle, true));
+        let more = if inside { (first + 1..row.len()).take_while(in_line).count() } else { 0 };
+        let run = &mut row[first..=first + more];
+        let at = |x: usize| point(first + x, triangle);
+        if neighbours.get() == 1 {
+            before = fill_run(tree, run, &at, before);
+        } else {
+            for (x, texel) in run.iter_mut().enumerate() {
+                *texel = mean_of_nearest(tree, &at(x), neighbours).map_or(*texel, Texel::Seen);
+            }
+        }
+        first += more + 1;
+    }
+}
+
+/// Gives each texel of a run the values of the point nearest to it. The texels lie in line in the tree's space.
+/// `before` is the nearest point of the texel before the run, if known. Returns that of the run's last texel.
+fn fill_run<'t, P: Point<Scalar = f32>>(
+    tree: &'t RTree<Known<P>>,
+    run: &mut [Texel],
+    at: &impl Fn(usize) -> P,
+    before: Option<&'t Known<P>>,
+) -> Option<&'t Known<P>> {
+    let last = run.len() - 1;
+    let of_first = nearest(tree, &at(0), before)?;
+    run[0] = Texel::Seen(of_first.data);
+    if last == 0 {
+        return Some(of_first);
+    }
+    let of_last = nearest(tree, &at(last), (last <= NEAR).then_some(of_first))?;
+    run[last] = Texel::Seen(of_last.data);
+    fill_between(tree, run, at, [(0, of_first), (last, of_last)]);
+    Some(of_last)
+}
+
+/// Fills the texels of a run between two, which are given with their nearest points.
+///
+/// The places to which one point is nearest form a convex set (a cell of the Voronoi diagram). Where both ends have the
+/// same point, all texels between have it, up to the rounding of places to `f32`; otherwise the point of the middle is
+/// searched for and both halves are filled. This holds with normals, too: a triangle has a single one, so that its
+/// texels also lie in line in six dimensions.
+fn fill_between<'t, P: Point<Scalar = f32>>(
+    tree: &'t RTree<Known<P>>,
+    run: &mut [Texel],
+    at: &impl Fn(usize) -> P,
+    [(first, of_first), (last, of_last)]: [(usize, &'t Known<P>); 2],
+) {
+    if last - first < 2 {
+        return;
+    }
+    if of_first.geom() == of_last.geom() {
+        run[first + 1..last].fill(Texel::Seen(of_first.data));
+        return;
+    }
+    let middle = first.midpoint(last);
+    let point = at(middle);
+    let nearer = if of_last.distance_2(&point) < of_first.distance_2(&point) { of_last } else { of_first };
+    let of_middle = nearest(tree, &point, (last - first <= NEAR).then_some(nearer)).unwrap_or(nearer);
+    run[middle] = Texel::Seen(of_middle.data);
+    fill_between(tree, run, at, [(first, of_first), (middle, of_middle)]);
+    fill_between(tree, run, at, [(middle, of_middle), (last, of_last)]);
+}
+
+/// The nearest point of the tree; none without any points. With `known`, one of its points, the search reaches no
+/// further than that.
+fn nearest<'t, P: Point<Scalar = f32>>(
+    tree: &'t RTree<Known<P>>,
+    point: &P,
+    known: Option<&'t Known<P>>,
+) -> Option<&'t Known<P>> {
+    let Some(known) = known else { return tree.nearest_neighbor(point) };
+    let apart = |other: &Known<P>| other.distance_2(point);
+    let near = tree.locate_within_distance(point.clone(), apart(known));
+    near.min_by(|a, b| apart(a).total_cmp(&apart(b)))
+}
+
+/// The mean of the nearest points' values with the inverse square of the distance as weight; none without any points.
+fn mean_of_nearest<P: Point<Scalar = f32>>(
+    tree: &RTree<Known<P>>,
+    point: &P,
     neighbours: NonZero<usize>,
 ) -> Option<Values> {
-    if neighbours.get() == 1 {
-        return tree.nearest_neighbor(&point).map(|nearest| nearest.data);
-    }
     let (mut sum, mut weights) = ([0.0_f64; 5], 0.0);
-    for (near, distance2) in tree.nearest_neighbor_iter_with_distance_2(&point).take(neighbours.get()) {
+    for (near, distance2) in tree.nearest_neighbor_iter_with_distance_2(point).take(neighbours.get()) {
         // The bound keeps the weight finite at a seen point, whose values then outweigh all others.
         let weight = 1.0 / f64::from(distance2).max(1e-12);
         sum.iter_mut().zip(near.data).for_each(|(sum, value)| *sum += weight * f64::from(value));
@@ -102,35 +215,15 @@ fn from_nearest<P: rstar::Point<Scalar = f32>>(
     (weights > 0.0).then(|| sum.map(|sum| (sum / weights) as f32))
 }
 
-/// Gives every unseen texel the values of the seen points nearest to it. Returns false where no point is seen.
-pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) -> bool {
-    if cloud.is_empty() {
-        return false;
-    }
-    let PartialAtlas { atlas, texels } = known;
-    let size = atlas.size();
-    texels.pixels_mut().par_chunks_mut(size).enumerate().for_each(|(y, row)| {
-        for (x, texel) in row.iter_mut().enumerate().filter(|(_, texel)| **texel == Texel::Unseen) {
-            let Some((triangle, _)) = atlas.owner(x, y) else { continue };
-            let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            let place = place_of(atlas, mesh, triangle, centre);
-            if let Some(values) = cloud.values_at(place, mesh.geometric_normal(triangle)) {
-                *texel = Texel::Seen(values);
-            }
-        }
-    });
-    true
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use mateval_dataset::uv_atlas::UvAtlas;
+    use mateval_dataset::splitmix64;
     use mateval_image::Picture;
     use mateval_testkit::scenes::quad;
 
-    use super::FillRule;
     use super::*;
+    use crate::lift::PartialAtlas;
 
     /// A wall of 2 m x 2 m along an axis; its uv are the unit square.
     fn wall() -> TriangleMesh {
@@ -157,8 +250,12 @@ mod tests {
 
     fn filled(neighbours: usize, normal_weight_m: f64) -> PartialAtlas {
         let rule = FillRule { neighbours: NonZero::new(neighbours).unwrap(), normal_weight_m };
-        let mut known = known();
-        assert!(fill(&SeenCloud::new(rule, seen()), &mut known, &wall()));
+        fill(&SeenCloud::new(rule, seen()), known())
+    }
+
+    fn fill(cloud: &SeenCloud, mut known: PartialAtlas) -> PartialAtlas {
+        let rows = known.texels.pixels_mut().chunks_mut(48).enumerate();
+        rows.for_each(|(y, row)| cloud.fill_row(&known.atlas, &wall(), y, row));
         known
     }
 
@@ -171,6 +268,40 @@ mod tests {
                 let apart = |(point, _): &(SeenPoint, Values)| point.place.distance_squared(centre);
                 let nearest = all.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
                 assert_eq!(filled.texels.get(x, y), Texel::Seen(nearest.unwrap().1));
+            }
+        }
+    }
+
+    /// The points lie in no order before and behind the wall, so that their cells end anywhere in a row.
+    #[test]
+    fn each_texel_of_a_run_has_its_own_nearest_point() {
+        for (count, weight) in [(3, 0.0), (60, 0.0), (60, 0.3), (2_000, 0.0)] {
+            let mut next = 0;
+            let mut number = || {
+                next += 1;
+                (splitmix64::number(7, next) >> 40) as f64 / f64::from(1 << 24)
+            };
+            let point = |at: usize| {
+                let place = DVec3::new(2.0 * number(), 2.0 * number(), number() - 0.5);
+                let normal = if at.is_multiple_of(2) { DVec3::Z } else { DVec3::X };
+                (SeenPoint { instance: 0, pixel: (at, 0), place, normal }, [at as f32, 0.0, 0.0, 0.0, 0.0])
+            };
+            let all: Vec<(SeenPoint, Values)> = (0..count).map(point).collect();
+            let rule = FillRule { normal_weight_m: weight, ..FillRule::default() };
+            let atlas = UvAtlas::new(&wall(), 48);
+            let texels = Picture::filled(48, 48, Texel::Unseen);
+            let filled = fill(&SeenCloud::new(rule, all.iter().copied()), PartialAtlas { atlas, texels });
+            for (x, y) in (0..48).flat_map(|x| (0..48).map(move |y| (x, y))) {
+                let centre = DVec3::new((x as f64 + 0.5) / 24.0, 2.0 - (y as f64 + 0.5) / 24.0, 0.0);
+                let apart = |(point, _): &(SeenPoint, Values)| {
+                    let of_normal = (point.normal - DVec3::Z).length() * weight / 2.0;
+                    (point.place.distance_squared(centre) + of_normal * of_normal).sqrt()
+                };
+                let least = all.iter().map(apart).fold(f64::INFINITY, f64::min);
+                let Texel::Seen(found) = filled.texels.get(x, y) else { panic!("not filled") };
+                let of_found = apart(&all[found[0] as usize]);
+                // Places up to 2 m from the origin are rounded to f32.
+                assert!(of_found - least < 1e-5, "{count} points, texel ({x}, {y}): {of_found} m, not {least} m");
             }
         }
     }
@@ -205,10 +336,14 @@ mod tests {
 
     #[test]
     fn without_points_nothing_is_filled() {
-        assert!(!fill(&SeenCloud::new(FillRule::default(), []), &mut known(), &wall()));
-        // Many points at one place.
-        let (point, value) = seen()[0];
-        let many = std::iter::repeat_n((point, value), 100_000);
-        assert!(fill(&SeenCloud::new(FillRule::default(), many), &mut known(), &wall()));
+        let none = SeenCloud::new(FillRule::default(), []);
+        assert!(none.is_empty());
+        assert_eq!(fill(&none, known()).texels, known().texels);
+    }
+
+    #[test]
+    fn many_points_at_one_place_fill_too() {
+        let many = SeenCloud::new(FillRule::default(), std::iter::repeat_n(seen()[0], 100_000));
+        assert!(fill(&many, known()).texels.pixels().iter().all(|texel| *texel != Texel::Unseen));
     }
 }

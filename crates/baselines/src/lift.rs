@@ -49,24 +49,11 @@ pub fn lift(
     instance: usize,
     size: usize,
 ) -> PartialAtlas {
-    let mesh = geometry.mesh(instance);
-    let atlas = UvAtlas::new(mesh, size);
-    let lifter = Lifter {
-        geometry,
-        seen,
-        estimate,
-        instance,
-        mesh,
-        atlas: &atlas,
-        origin: seen.camera.position(),
-        projection: seen.camera.projection(),
-        focal: seen.camera.intrinsics.fx.max(seen.camera.intrinsics.fy),
-    };
+    let atlas = UvAtlas::new(geometry.mesh(instance), size);
+    let lifter = Lifter::new(geometry, seen, estimate, instance, &atlas);
     // An atlas has up to 16 million texels, so it is filled in place.
     let mut texels = Picture::filled(size, size, Texel::Unused);
-    texels.pixels_mut().par_chunks_mut(size).enumerate().for_each(|(y, row)| {
-        row.iter_mut().enumerate().for_each(|(x, texel)| *texel = lifter.texel(x, y));
-    });
+    texels.pixels_mut().par_chunks_mut(size).enumerate().for_each(|(y, row)| lifter.row(y, row));
     PartialAtlas { atlas, texels }
 }
 
@@ -109,7 +96,8 @@ pub fn mean(all: &[Values]) -> Option<Values> {
     (!all.is_empty()).then(|| std::array::from_fn(|channel| (sum(channel) / count) as f32))
 }
 
-struct Lifter<'a> {
+/// Lifts an estimate to the atlas of one instance, row by row.
+pub(crate) struct Lifter<'a> {
     geometry: &'a SceneGeometry<'a>,
     seen: &'a SeenPixels,
     estimate: &'a Estimate,
@@ -121,20 +109,56 @@ struct Lifter<'a> {
     focal: f64,
 }
 
-impl Lifter<'_> {
-    fn texel(&self, x: usize, y: usize) -> Texel {
-        let Some((triangle, _)) = self.atlas.owner(x, y) else { return Texel::Unused };
-        let centre = DVec2::new(x as f64, y as f64) + 0.5;
-        let places = places_of(self.atlas, self.mesh, (x, y), self.places_per_side(triangle, centre));
-        let values: Vec<Values> = places.into_iter().filter_map(|place| self.estimate_at(place)).collect();
-        mean(&values).map_or(Texel::Unseen, Texel::Seen)
+impl<'a> Lifter<'a> {
+    pub(crate) fn new(
+        geometry: &'a SceneGeometry<'a>,
+        seen: &'a SeenPixels,
+        estimate: &'a Estimate,
+        instance: usize,
+        atlas: &'a UvAtlas,
+    ) -> Self {
+        Self {
+            geometry,
+            seen,
+            estimate,
+            instance,
+            mesh: geometry.mesh(instance),
+            atlas,
+            origin: seen.camera.position(),
+            projection: seen.camera.projection(),
+            focal: seen.camera.intrinsics.fx.max(seen.camera.intrinsics.fy),
+        }
     }
 
-    /// The number of places per side at which neighbours are at most half a pixel apart.
-    fn places_per_side(&self, triangle: usize, centre: DVec2) -> usize {
-        let texel_m = texel_size_m(self.atlas, self.mesh, triangle);
-        let distance = place_of(self.atlas, self.mesh, triangle, centre).distance(self.origin).max(1e-6);
-        (2.0 * self.focal * texel_m / distance).ceil().clamp(1.0, MAX_PLACES) as usize
+    /// Writes what the input view shows of the texels of row `y`.
+    pub(crate) fn row(&self, y: usize, row: &mut [Texel]) {
+        // Neighbours mostly belong to one triangle, whose texels have one size.
+        let mut before: Option<(usize, f64)> = None;
+        for (x, texel) in row.iter_mut().enumerate() {
+            *texel = match self.atlas.owner(x, y) {
+                None => Texel::Unused,
+                Some((triangle, _)) => {
+                    let known = before.filter(|(same, _)| *same == triangle);
+                    let texel_m = known.map_or_else(|| texel_size_m(self.atlas, self.mesh, triangle), |known| known.1);
+                    before = Some((triangle, texel_m));
+                    self.texel((x, y), triangle, texel_m)
+                }
+            };
+        }
+    }
+
+    /// What the input view shows of a texel. `texel_m` is the side of its triangle's texels, in metres.
+    fn texel(&self, (x, y): (usize, usize), triangle: usize, texel_m: f64) -> Texel {
+        let centre = place_of(self.atlas, self.mesh, triangle, DVec2::new(x as f64, y as f64) + 0.5);
+        let distance = centre.distance(self.origin).max(1e-6);
+        // Neighbouring places are then at most half a pixel apart.
+        let places_per_side = (2.0 * self.focal * texel_m / distance).ceil().clamp(1.0, MAX_PLACES) as usize;
+        if places_per_side == 1 {
+            return self.estimate_at(centre).map_or(Texel::Unseen, Texel::Seen);
+        }
+        let places = places_of(self.atlas, self.mesh, (x, y), places_per_side);
+        let values: Vec<Values> = places.into_iter().filter_map(|place| self.estimate_at(place)).collect();
+        mean(&values).map_or(Texel::Unseen, Texel::Seen)
     }
 
     /// The estimate at a place of the instance, if the camera sees it.

@@ -9,6 +9,7 @@ use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_files::work_folder::make_folder;
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{Picture, png_io};
+use rayon::prelude::*;
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
@@ -33,45 +34,49 @@ pub struct Maps {
 impl Maps {
     /// The maps of an atlas, with filled gutters. Maps that are not given have no file.
     pub fn of_atlas(known: &PartialAtlas, given: GivenMaps) -> Self {
-        let mut maps = Self::of_values(&known.texels, |texel| texel.seen().unwrap_or(DEFAULT), given);
-        if let Some(map) = &mut maps.base_color {
-            known.atlas.fill_gutters(map);
-        }
-        for map in [&mut maps.roughness, &mut maps.metallic].into_iter().flatten() {
-            known.atlas.fill_gutters(map);
-        }
+        let size = known.atlas.size();
+        let mut maps = Self::filled(size, DEFAULT, given);
+        let rows = maps.rows(size).into_par_iter().zip(known.texels.pixels().par_chunks(size));
+        rows.for_each(|(mut row, texels)| row.set(texels));
+        maps.fill_gutters(&known.atlas);
         maps
     }
 
     /// Maps with the same values everywhere.
     pub fn constant(values: Values, given: GivenMaps) -> Self {
-        let size = *MAP_SIZES.start();
-        Self::of_values(&Picture::filled(size, size, values), |values| values, given)
+        Self::filled(*MAP_SIZES.start(), values, given)
     }
 
-    fn of_values<T: Copy>(texels: &Picture<T>, values: impl Fn(T) -> Values, given: GivenMaps) -> Self {
-        // Texels that are filled from one point are a row of equal colours.
-        let mut last = ([0.0; 3], srgb_bytes([0.0; 3]));
-        let mut bytes = |color: [f32; 3]| {
-            if color != last.0 {
-                last = (color, srgb_bytes(color));
-            }
-            last.1
-        };
-        let color = || {
-            texels.map(|texel| {
-                let [r, g, b, ..] = values(texel);
-                bytes([r, g, b])
-            })
-        };
-        let scalar = |is_given: bool, channel: usize| {
-            is_given.then(|| texels.map(|texel| byte_from_unit(values(texel)[channel])))
-        };
+    /// Maps of `size` x `size` texels with the same values everywhere.
+    pub(crate) fn filled(size: usize, values: Values, given: GivenMaps) -> Self {
+        let [r, g, b, roughness, metallic] = values;
+        let scalar = |is_given: bool, value: f32| is_given.then(|| Picture::filled(size, size, byte_from_unit(value)));
         Self {
-            base_color: given.base_color.then(color),
-            roughness: scalar(given.roughness, 3),
-            metallic: scalar(given.metallic, 4),
+            base_color: given.base_color.then(|| Picture::filled(size, size, srgb_bytes([r, g, b]))),
+            roughness: scalar(given.roughness, roughness),
+            metallic: scalar(given.metallic, metallic),
         }
+    }
+
+    /// The rows of maps of `size` x `size` texels, from the top, to be changed in place.
+    pub(crate) fn rows(&mut self, size: usize) -> Vec<MapsRow<'_>> {
+        let mut base_color = rows_of(&mut self.base_color);
+        let (mut roughness, mut metallic) = (rows_of(&mut self.roughness), rows_of(&mut self.metallic));
+        let next =
+            |_| MapsRow { base_color: base_color.next(), roughness: roughness.next(), metallic: metallic.next() };
+        (0..size).map(next).collect()
+    }
+
+    /// Gives every texel without an owner the values of an owned one nearby.
+    pub(crate) fn fill_gutters(&mut self, atlas: &UvAtlas) {
+        let mut base_color = self.base_color.as_mut().map(Picture::pixels_mut);
+        let mut scalars = [&mut self.roughness, &mut self.metallic].map(|map| map.as_mut().map(Picture::pixels_mut));
+        atlas.each_gutter_texel(|to, from| {
+            if let Some(pixels) = &mut base_color {
+                pixels[to] = pixels[from];
+            }
+            scalars.iter_mut().flatten().for_each(|pixels| pixels[to] = pixels[from]);
+        });
     }
 
     /// Writes the maps to the instance's folder, which is created.
@@ -87,6 +92,42 @@ impl Maps {
             }
         }
         Ok(())
+    }
+}
+
+fn rows_of<T: Copy>(map: &mut Option<Picture<T>>) -> impl Iterator<Item = &mut [T]> {
+    map.iter_mut().flat_map(|map| {
+        let width = map.width();
+        map.pixels_mut().chunks_mut(width)
+    })
+}
+
+/// A row of each map that is given.
+pub(crate) struct MapsRow<'a> {
+    base_color: Option<&'a mut [[u8; 3]]>,
+    roughness: Option<&'a mut [u8]>,
+    metallic: Option<&'a mut [u8]>,
+}
+
+impl MapsRow<'_> {
+    /// Writes the values of a row of texels; those of texels without any are [`DEFAULT`].
+    pub(crate) fn set(&mut self, texels: &[Texel]) {
+        let values = |texel: &Texel| texel.seen().unwrap_or(DEFAULT);
+        if let Some(row) = &mut self.base_color {
+            // Texels that are filled from one point are a row of equal colours.
+            let mut last = ([0.0; 3], srgb_bytes([0.0; 3]));
+            for (bytes, texel) in row.iter_mut().zip(texels) {
+                let [r, g, b, ..] = values(texel);
+                if [r, g, b] != last.0 {
+                    last = ([r, g, b], srgb_bytes([r, g, b]));
+                }
+                *bytes = last.1;
+            }
+        }
+        for (row, channel) in [(&mut self.roughness, 3), (&mut self.metallic, 4)] {
+            let bytes = row.iter_mut().flat_map(|row| row.iter_mut());
+            bytes.zip(texels).for_each(|(byte, texel)| *byte = byte_from_unit(values(texel)[channel]));
+        }
     }
 }
 

@@ -8,17 +8,18 @@ use std::path::Path;
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::open::Dataset;
-use mateval_dataset::submission::MAP_SIZES;
+use mateval_dataset::uv_atlas::UvAtlas;
 use mateval_dataset::{Progress, Report};
+use mateval_image::{Mask, Picture};
 use rayon::prelude::*;
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
 use crate::estimate_source::EstimateSource;
-use crate::fill::{FillRule, SeenCloud, fill};
+use crate::fill::{FillRule, SeenCloud};
 use crate::geometry::{SceneGeometry, SeenPixels, SeenPoint};
-use crate::lift::{PartialAtlas, lift};
-use crate::maps::{Maps, Medians};
+use crate::lift::{Lifter, Texel};
+use crate::maps::{DEFAULT, Maps, Medians};
 use crate::submission::{self, Method};
 
 /// How unseen texels are filled.
@@ -87,7 +88,7 @@ pub fn write_scene(
     let seen = seen_pixels(&geometry, &estimate)?;
     lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
         let maps = match lifted {
-            Some(lifted) => Maps::of_atlas(&lifted.whole, estimate.given_maps()),
+            Some(lifted) => lifted.maps,
             None => Maps::constant(medians.of(&geometry, instance), estimate.given_maps()),
         };
         maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
@@ -96,10 +97,12 @@ pub fn write_scene(
 
 /// An instance's atlas after lifting and filling.
 pub struct Lifted {
-    /// The atlas, in which every texel that belongs to a triangle is known.
-    pub whole: PartialAtlas,
-    /// Whether each texel was seen before filling, row by row.
-    pub seen: Vec<bool>,
+    /// The triangle that each texel belongs to.
+    pub atlas: UvAtlas,
+    /// The maps, with filled gutters.
+    pub maps: Maps,
+    /// Whether each texel was seen before filling.
+    pub seen: Mask,
 }
 
 /// Determines which instance each pixel of the estimate shows.
@@ -132,17 +135,36 @@ pub fn lift_scene(
         seen.points(geometry).into_iter().map(|point| (point, estimate.at(point.pixel.0, point.pixel.1))).collect();
     let all = options.any_instance.then(|| SeenCloud::new(options.rule, points.iter().copied()));
     let lifted = |instance: usize, size: usize| {
-        let mut whole = lift(geometry, seen, estimate, instance, size);
-        let is_seen = whole.texels.pixels().iter().map(|texel| texel.seen().is_some()).collect();
-        let mesh = geometry.mesh(instance);
-        let filled = match &all {
-            Some(all) => fill(all, &mut whole, mesh),
+        let own;
+        let cloud = match &all {
+            Some(all) => all,
             None => {
-                let own = points.iter().filter(|(point, _)| point.instance == instance).copied();
-                fill(&SeenCloud::new(options.rule, own), &mut whole, mesh)
+                let of_instance = points.iter().filter(|(point, _)| point.instance == instance).copied();
+                own = SeenCloud::new(options.rule, of_instance);
+                &own
             }
         };
-        filled.then_some(Lifted { whole, seen: is_seen })
+        if cloud.is_empty() {
+            return None;
+        }
+        let mesh = geometry.mesh(instance);
+        let atlas = UvAtlas::new(mesh, size);
+        let lifter = Lifter::new(geometry, seen, estimate, instance, &atlas);
+        let (mut maps, mut shown) =
+            (Maps::filled(size, DEFAULT, estimate.given_maps()), Picture::filled(size, size, false));
+        // A texel's values take four times the memory of its bytes in the maps, so only rows of them are kept.
+        let rows = maps.rows(size).into_par_iter().zip(shown.pixels_mut().par_chunks_mut(size)).enumerate();
+        rows.for_each_init(
+            || vec![Texel::Unused; size],
+            |texels, (y, (mut maps, shown))| {
+                lifter.row(y, texels);
+                shown.iter_mut().zip(&*texels).for_each(|(shown, texel)| *shown = texel.seen().is_some());
+                cloud.fill_row(&atlas, mesh, y, texels);
+                maps.set(texels);
+            },
+        );
+        maps.fill_gutters(&atlas);
+        Some(Lifted { atlas, maps, seen: shown })
     };
     let (step, mut done) = (format!("{} lift", geometry.scene.id), 0);
     for batch in batches(&with_atlas) {
@@ -154,12 +176,15 @@ pub fn lift_scene(
     Ok(with_atlas.len())
 }
 
-/// Splits the instances into batches, each with at most as many texels as the largest atlas: a bound on memory.
+/// The most texels of atlases that are worked on at once, unless one atlas has more: a bound on memory. The rows of
+/// each are spread over the threads, so that a batch of one atlas keeps all of them at work.
+const BATCH_TEXELS: usize = 2048 * 2048;
+
+/// Splits the instances, each given with its atlas's width, into batches of at most [`BATCH_TEXELS`].
 fn batches(with_atlas: &[(usize, usize)]) -> Vec<&[(usize, usize)]> {
-    let most = *MAP_SIZES.end() * *MAP_SIZES.end();
     let (mut batches, mut first, mut texels) = (Vec::new(), 0, 0);
     for (at, (_, size)) in with_atlas.iter().enumerate() {
-        if at > first && texels + size * size > most {
+        if at > first && texels + size * size > BATCH_TEXELS {
             batches.push(&with_atlas[first..at]);
             (first, texels) = (at, 0);
         }
@@ -167,4 +192,19 @@ fn batches(with_atlas: &[(usize, usize)]) -> Vec<&[(usize, usize)]> {
     }
     batches.push(&with_atlas[first..]);
     batches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_batch_is_bounded_by_its_texels() {
+        let sizes = |sizes: &[usize]| -> Vec<Vec<usize>> {
+            let all: Vec<(usize, usize)> = sizes.iter().copied().enumerate().collect();
+            batches(&all).into_iter().map(|batch| batch.iter().map(|(_, size)| *size).collect()).collect()
+        };
+        assert_eq!(sizes(&[1024, 1024, 1024, 1024, 64]), [vec![1024; 4], vec![64]]);
+        assert_eq!(sizes(&[64, 4096, 64, 2048]), [vec![64], vec![4096], vec![64], vec![2048]]);
+    }
 }

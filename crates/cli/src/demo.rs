@@ -426,6 +426,7 @@ fn write_leaderboard(demo: &DemoFolder, options: &Options, dataset: &Dataset) ->
         }),
         votes: false,
         original: None,
+        hub: None,
         tool: TOOL.to_owned(),
     };
     with_progress(|progress| leaderboard::write(&plan, &demo.leaderboard, true, progress))

@@ -4,9 +4,12 @@
 mod show;
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail};
 use mateval_dataset::open::{Dataset, check_outside_datasets};
+use mateval_dataset::scene_cost::processor_time;
 use mateval_dataset::{SceneId, json};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
@@ -27,7 +30,7 @@ use crate::TOOL;
 use crate::arguments::{Format, check_output_file, open_submission};
 use crate::fetch::{FETCH_LPIPS, load_weights};
 use crate::key::today;
-use crate::terminal::{Outcome, print, print_fitted, say_findings, with_progress};
+use crate::terminal::{Outcome, counted, print, print_fitted, say, say_findings, with_progress};
 
 /// Subcommands of `eval`.
 #[derive(clap::Subcommand)]
@@ -186,6 +189,11 @@ impl ScoreArgs {
             // A folder that cannot be made is found before anything is scored.
             std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
         }
+        let times = Mutex::new(Vec::new());
+        let keep_time = |scene: &SceneId, time: Duration| {
+            times.lock().unwrap_or_else(PoisonError::into_inner).push((time, scene.clone()));
+        };
+        let (start, processor) = (Instant::now(), processor_time());
         let plan = ScorePlan {
             dataset: &dataset,
             submissions: opened.iter().map(Opened::root).collect(),
@@ -198,8 +206,12 @@ impl ScoreArgs {
             only_cached: self.only_cached,
             pictures: self.pictures.as_deref(),
             seen: None,
+            timed: Some(&keep_time),
         };
         let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
+        let processor = processor.zip(processor_time()).map(|(before, after)| after.saturating_sub(before));
+        let times = times.lock().unwrap_or_else(PoisonError::into_inner);
+        let cost = cost_text(&times, self.submissions.len(), start.elapsed(), processor);
         for (result, out) in results.iter().zip(&outs) {
             json::write_lines(out, result)?;
             if let Some(rounded) = &self.rounded {
@@ -208,6 +220,7 @@ impl ScoreArgs {
             say_findings(&result.method, &result.findings, &out.display().to_string());
             print(&format!("{}\n", out.display()))?;
         }
+        cost.iter().for_each(|text| say(text));
         if self.cache.is_none() && cache.exists() {
             std::fs::remove_dir_all(&cache).with_context(|| format!("cannot remove '{}'", cache.display()))?;
         }
@@ -221,6 +234,27 @@ impl ScoreArgs {
             several => several.iter().map(|path| self.out.join(format!("{}.json", submission_name(path)))).collect(),
         }
     }
+}
+
+/// What scoring cost, for whoever sizes a queue: times in seconds, as the time limits of queues and `prep export
+/// --seconds-a-scene` are. Absent if every score was in the cache.
+fn cost_text(
+    times: &[(Duration, SceneId)],
+    submissions: usize,
+    wall: Duration,
+    processor: Option<Duration>,
+) -> Option<String> {
+    let (longest, slowest) = times.iter().max()?;
+    let processor = processor.map(|time| format!("; {:.1} s of processor time", time.as_secs_f64()));
+    Some(format!(
+        "{} scored on {} in {:.1} s: {:.1} s per scene, {:.1} s for the slowest, '{slowest}'{}",
+        counted(submissions, "submission"),
+        counted(times.len(), "scene"),
+        wall.as_secs_f64(),
+        wall.as_secs_f64() / times.len() as f64,
+        longest.as_secs_f64(),
+        processor.unwrap_or_default(),
+    ))
 }
 
 /// Fails where a result could not be written. Scoring takes minutes, so this comes first.

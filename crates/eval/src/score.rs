@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use mateval_dataset::dataset::SceneFile;
 use mateval_dataset::layout::INPUT;
@@ -73,7 +74,13 @@ pub struct ScorePlan<'a> {
     /// Gets every view from the input view's place under the scene's own or fitted light, as pages show it; captured
     /// rooms pass none. No scores are then taken from the cache.
     pub seen: Option<&'a SeenSink<'a>>,
+    /// Gets the time that each scene took for all submissions together, except scenes whose scores were all in the
+    /// cache.
+    pub timed: Option<&'a TimeSink<'a>>,
 }
+
+/// Gets a scene and its elapsed time; several threads may call it. Results do not depend on it.
+pub type TimeSink<'a> = dyn Fn(&SceneId, Duration) + Sync + 'a;
 
 /// One submission while it is being scored.
 struct SubmissionScores {
@@ -178,6 +185,7 @@ fn score_or_recall(
     scene: &SceneFile,
     progress: Progress<'_>,
 ) -> Result<Vec<SceneOutcome>, EvalError> {
+    let start = Instant::now();
     let atlases = AtlasMeshes::on_demand(plan.dataset, scene);
     let read = |path: &&Path| read_scene(path, scene, &atlases);
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(read).collect::<Result<_, _>>()?;
@@ -207,6 +215,9 @@ fn score_or_recall(
         files.extend(twins.answers.into_iter().flat_map(|(_, answer)| answer.files));
         let scores = scores.expect("scores that were not cached have just been computed");
         outcomes.push(SceneOutcome { findings, files, scores, constancy });
+    }
+    if let Some(timed) = plan.timed.filter(|_| !uncached.is_empty()) {
+        timed(&scene.id, start.elapsed());
     }
     Ok(outcomes)
 }
@@ -375,7 +386,7 @@ fn protocol_result(
 }
 
 /// The findings that scoring adds to those of reading a submission: light that is not finite, scenes of another
-/// protocol, scenes of unknown light, and maps that are not predicted.
+/// protocol, captured scenes without measured colours, scenes of unknown light, and maps that are not predicted.
 fn scoring_findings(
     plan: &ScorePlan<'_>,
     scored: &[&SceneFile],
@@ -393,8 +404,11 @@ fn scoring_findings(
         }
     }
     for scene in scored {
-        let without = plan.protocols.iter().filter(|protocol| !protocol.scores(scene));
-        let names: Vec<&str> = without.map(|protocol| protocol.name.as_str()).collect();
+        let without: Vec<&Protocol> = plan.protocols.iter().filter(|protocol| !protocol.scores(scene)).collect();
+        let names: Vec<&str> = without.iter().map(|protocol| protocol.name.as_str()).collect();
+        // A warning is printed; notes are only counted. A result without any number must not pass unnoticed.
+        let is_empty = without.iter().any(|protocol| !scored.iter().any(|other| protocol.scores(other)));
+        let severity = if is_empty { Severity::Warning } else { Severity::Note };
         if !names.is_empty() {
             let file = format!("scenes/{}/scene.json", scene.id);
             let (message, action) = match scene.source.kind.states_materials() {
@@ -402,7 +416,13 @@ fn scoring_findings(
                 true => ("the scene is not captured, so that no colour in it was measured", "another --protocol"),
             };
             let action = format!("has no value under '{}'; score it with {action}", names.join("', '"));
-            findings.push(Finding::new(Severity::Note, "other_protocol", file, "/source/kind", message, action));
+            findings.push(Finding::new(severity, "other_protocol", file, "/source/kind", message, action));
+        }
+        let is_captured = !scene.source.kind.states_materials();
+        if is_captured && names.len() < plan.protocols.len() && !plan.dataset.folder(&scene.id).has_measured() {
+            let (file, message) = (format!("scenes/{}", scene.id), "no colours were measured in the captured room");
+            let action = "scored its photos alone; do not rank methods by `rgb_fitted` alone";
+            findings.push(Finding::new(Severity::Note, "no_measured", file, "", message, action));
         }
     }
     if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
@@ -443,6 +463,7 @@ impl<'a> ScorePlan<'a> {
             only_cached: false,
             pictures: None,
             seen: None,
+            timed: None,
         }
     }
 
@@ -586,7 +607,7 @@ fn not_predicted(files: &[HashedFile]) -> Vec<Map> {
     Map::ALL.into_iter().filter(|map| !files.iter().any(|file| is_of(file, *map))).collect()
 }
 
-/// The metrics that lack weights or renders.
+/// The metrics that lack weights, renders or measured colours.
 fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
     let mut missing = Vec::new();
     if let LpipsWeights::Missing { reason, fix } = &plan.lpips {
@@ -594,6 +615,16 @@ fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
             metric: MissingNumbers::Metric(Metric::LpipsAlex),
             reason: reason.clone(),
             fix: fix.clone(),
+        });
+    }
+    // Base colours of captured scenes are compared with measured ones alone.
+    let captured: Vec<&&SceneFile> = scored.iter().filter(|scene| !scene.source.kind.states_materials()).collect();
+    let are_scored = plan.protocols.iter().any(|protocol| protocol.measured.is_some()) && !captured.is_empty();
+    if are_scored && !captured.iter().any(|scene| plan.dataset.folder(&scene.id).has_measured()) {
+        missing.push(MissingMetric {
+            metric: MissingNumbers::Picture(PictureKind::Measured),
+            reason: "the captured rooms have no measured colours".to_owned(),
+            fix: "state `measured` in the recipe, and mateval prep build".to_owned(),
         });
     }
     if scored.iter().any(|scene| scene.photo.is_none()) {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_dataset::dataset::{SceneFile, View};
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::lighting::LightingName;
 use mateval_dataset::open::Dataset;
 use mateval_dataset::{Progress, TriangleMesh, ViewId};
@@ -12,6 +13,7 @@ use mateval_submission::atlas::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 use crate::error::EvalError;
+use crate::light::own_lights::light_of_groups;
 use crate::light::reference::StoredReference;
 use crate::light::score::compare_under_lights;
 use crate::materials::pictures::{Places, material_pictures};
@@ -117,4 +119,23 @@ pub fn scene_light(
         predicted: predicted.values().map(|views| views[at].clone()).collect(),
     };
     Ok(rows.map(row).collect())
+}
+
+/// The lightings of a scene besides its own light that [`scene_light`] takes. Fails if the dataset has no reference of
+/// the scene.
+pub fn scene_lightings(
+    dataset: &Dataset,
+    scene: &SceneFile,
+    protocol: &Protocol,
+) -> Result<Vec<LightingName>, EvalError> {
+    if !protocol.light.tracks.contains(&Track::Relit) {
+        return Ok(Vec::new());
+    }
+    let Some(reference) = StoredReference::listed(dataset, scene)? else {
+        return Err(EvalError::NoPhotoRenderer { dataset: dataset.root.clone() });
+    };
+    let input = scene.view(INPUT).ok_or_else(|| EvalError::no_input_view(&scene.id))?;
+    let group_light = light_of_groups(&dataset.folder(&scene.id), input, &reference)?;
+    let lightings = protocol.light.lightings_of(Track::Relit, &group_light);
+    Ok(lightings.into_iter().filter_map(|(name, _)| name).collect())
 }

@@ -46,7 +46,8 @@ pub struct Exported {
     pub scenes: usize,
     /// Number of views that are described; `None` for tars, which hold whole scenes.
     pub views: Option<usize>,
-    /// Number of views that were left out, or described without a picture, because their pictures are withheld.
+    /// Number of views that were left out, or described without a picture, because their pictures are withheld or were
+    /// not rendered, as those of twins and of captured rooms.
     pub without_picture: usize,
 }
 
@@ -75,6 +76,12 @@ pub enum ExportError {
         "a scene takes {seconds} s, and a task may take {limit} s; give a longer --limit, which needs an own queue"
     )]
     SceneOverLimit { seconds: u32, limit: u32 },
+    #[error(
+        "'{}': the scene '{scene}' has a flash, which moves with the camera, and the format states no lights: photos \
+         of one place would contradict each other; export it as tar, which holds scene.json",
+        path.display()
+    )]
+    Flash { path: PathBuf, scene: SceneId },
     /// The scene has no such view.
     #[error("'{}' has no view '{view}' of the scene '{scene}'", path.display())]
     NoView {
@@ -112,6 +119,10 @@ impl SoundDataset {
             dataset.check_whole()?;
         } else if let Some(absence) = dataset.absence() {
             progress(Report::Message(&absence));
+        }
+        let is_of_cameras = matches!(format, Format::Nerfstudio | Format::Colmap);
+        if let Some(scene) = dataset.scenes.iter().find(|scene| is_of_cameras && scene.flash.is_some()) {
+            return Err(ExportError::Flash { path: root.to_owned(), scene: scene.id.clone() });
         }
         let has_photo = |scene: &SceneFile| scene.photo.is_some() || dataset.file.twins.contains_key(&scene.id);
         let is_rendered = |scene: &SceneFile| has_photo(scene) || dataset.photo_renderer(scene).is_some();

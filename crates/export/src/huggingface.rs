@@ -113,7 +113,11 @@ fn card(sound: &SoundDataset, exported: &Exported) -> String {
         file.manifest_sha256
     );
     if exported.without_picture > 0 {
-        let _ = writeln!(text, "{} views have no `picture`, because theirs is withheld.\n", exported.without_picture);
+        let _ = writeln!(
+            text,
+            "{} views have no `picture`, because theirs is withheld or was not rendered.\n",
+            exported.without_picture
+        );
     }
     text.push_str(COLUMNS);
     text.push_str("\n## Licences\n\n");

@@ -1,14 +1,18 @@
-//! The colour space that a photo's file states: an ICC profile, or the chunks gAMA, cHRM and cICP of a PNG.
+//! The colour space that a photo's file states, by an ICC profile, by the chunks gAMA, cHRM and cICP of a PNG, or by
+//! EXIF data; and the exposure that EXIF data states.
 //!
 //! Telephones store photos in Display P3. A profile of three primaries and three curves, or of one curve for grey, is
 //! applied; any other is refused by its name, since taking it for sRGB would change every colour. So is one that is
 //! damaged.
 
+use std::fmt;
 use std::io::Cursor;
 use std::path::Path;
 
 use image::{ImageDecoder as _, ImageReader};
 use moxcms::{ColorProfile, DataColorSpace, LocalizableString, ProfileText, ToneReprCurve, Xyzd};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::ImageError;
 use crate::png_io::PngHeader;
@@ -65,12 +69,7 @@ impl Profile {
             if states_icc(bytes) {
                 return Err(unreadable());
             }
-            // A TIFF is EXIF data itself.
-            let exif = match bytes {
-                [b'I', b'I', ..] | [b'M', b'M', ..] => bytes.to_vec(),
-                _ => decoder.exif_metadata().ok().flatten().unwrap_or_default(),
-            };
-            if let Some(space) = exif_color_space(&exif) {
+            if let Some(space) = Exif::of(bytes).color_space() {
                 return Err(unsupported(format!(
                     "its EXIF data states {space}, and it has no colour profile; convert the photo to sRGB"
                 )));
@@ -199,32 +198,107 @@ fn name_of(profile: &ColorProfile) -> String {
     if text.is_empty() { "(without a name)".to_owned() } else { text }
 }
 
-/// The colour space that EXIF data states where it is not sRGB (Exif 3.0, section 4.6.6.1, and DCF 2.0, which marks
-/// Adobe RGB by the interoperability index R03).
-fn exif_color_space(exif: &[u8]) -> Option<&'static str> {
-    const EXIF: u16 = 0x8769;
-    const COLOR_SPACE: u16 = 0xa001;
-    const INTEROPERABILITY: u16 = 0xa005;
-    const INDEX: u16 = 1;
-    let is_little = exif.starts_with(b"II");
-    let number = |at: usize, length: usize| {
-        let bytes = exif.get(at..at.checked_add(length)?)?;
+/// The settings of a camera that decide how much light a photo collects.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraExposure {
+    /// The exposure time, in seconds.
+    pub time_s: f64,
+    /// The sensitivity, as in ISO 100.
+    pub iso: f64,
+    /// The focal length divided by the aperture, as in f/2.8.
+    pub f_number: f64,
+}
+
+impl CameraExposure {
+    /// What the radiance of a surface is multiplied by, up to a factor of the camera (ISO 2720).
+    pub fn factor(&self) -> f64 {
+        self.time_s * self.iso / (self.f_number * self.f_number)
+    }
+
+    /// What a camera can be set to: the least and the largest time, sensitivity and f-number.
+    pub const RANGES: [(f64, f64); 3] = [(1e-6, 1e4), (1.0, 1e7), (0.5, 256.0)];
+
+    pub fn is_sound(&self) -> bool {
+        let values = [self.time_s, self.iso, self.f_number];
+        values.iter().zip(Self::RANGES).all(|(value, (least, most))| (least..=most).contains(value))
+    }
+}
+
+impl fmt::Display for CameraExposure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} s at ISO {} and f/{}", self.time_s, self.iso, self.f_number)
+    }
+}
+
+/// The EXIF data of a file (Exif 3.0): a TIFF without pixels. Empty where the file has none.
+pub(crate) struct Exif(Vec<u8>);
+
+impl Exif {
+    pub(crate) fn of(bytes: &[u8]) -> Self {
+        let stated = || {
+            let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
+            reader.into_decoder().ok()?.exif_metadata().ok()?
+        };
+        Self(match bytes {
+            // A TIFF is EXIF data itself.
+            [b'I', b'I', ..] | [b'M', b'M', ..] => bytes.to_vec(),
+            _ => stated().unwrap_or_default(),
+        })
+    }
+
+    fn number(&self, at: usize, length: usize) -> Option<usize> {
+        let bytes = self.0.get(at..at.checked_add(length)?)?;
         let shifted = |sum: usize, byte: &u8| sum << 8 | usize::from(*byte);
+        let is_little = self.0.starts_with(b"II");
         Some(if is_little { bytes.iter().rev().fold(0, shifted) } else { bytes.iter().fold(0, shifted) })
-    };
-    // The place of the value of an entry of the directory at an offset.
-    let value = |directory: usize, tag: u16| {
-        let entries = (0..number(directory, 2)?).map(|entry| directory.saturating_add(2 + 12 * entry));
-        entries.filter(|at| number(*at, 2) == Some(usize::from(tag))).map(|at| at.saturating_add(8)).next()
-    };
-    let directory = number(value(number(4, 4)?, EXIF)?, 4)?;
-    let index = value(directory, INTEROPERABILITY).and_then(|at| value(number(at, 4)?, INDEX));
-    let is_adobe = index.is_some_and(|at| exif.get(at..).is_some_and(|rest| rest.starts_with(b"R03")));
-    match value(directory, COLOR_SPACE).and_then(|at| number(at, 2)) {
-        _ if is_adobe => Some("Adobe RGB"),
-        Some(2) => Some("Adobe RGB"),
-        Some(0xffff) => Some("colours that are not sRGB (ColorSpace 65535)"),
-        _ => None,
+    }
+
+    /// The offset of the value of an entry of the directory at an offset.
+    fn value(&self, directory: usize, tag: u16) -> Option<usize> {
+        let entries = (0..self.number(directory, 2)?).map(|entry| directory.saturating_add(2 + 12 * entry));
+        entries.filter(|at| self.number(*at, 2) == Some(usize::from(tag))).map(|at| at.saturating_add(8)).next()
+    }
+
+    /// The offset of the directory of the camera's settings, the Exif IFD.
+    fn directory(&self) -> Option<usize> {
+        const EXIF: u16 = 0x8769;
+        self.number(self.value(self.number(4, 4)?, EXIF)?, 4)
+    }
+
+    /// The colour space where it is not sRGB (section 4.6.6.1, and DCF 2.0, which marks Adobe RGB by the
+    /// interoperability index R03).
+    fn color_space(&self) -> Option<&'static str> {
+        const COLOR_SPACE: u16 = 0xa001;
+        const INTEROPERABILITY: u16 = 0xa005;
+        const INDEX: u16 = 1;
+        let directory = self.directory()?;
+        let index = self.value(directory, INTEROPERABILITY).and_then(|at| self.value(self.number(at, 4)?, INDEX));
+        let is_adobe = index.is_some_and(|at| self.0.get(at..).is_some_and(|rest| rest.starts_with(b"R03")));
+        match self.value(directory, COLOR_SPACE).and_then(|at| self.number(at, 2)) {
+            _ if is_adobe => Some("Adobe RGB"),
+            Some(2) => Some("Adobe RGB"),
+            Some(0xffff) => Some("colours that are not sRGB (ColorSpace 65535)"),
+            _ => None,
+        }
+    }
+
+    /// The exposure by the tags ExposureTime, PhotographicSensitivity and FNumber, if all are stated and sound.
+    pub(crate) fn exposure(&self) -> Option<CameraExposure> {
+        const EXPOSURE_TIME: u16 = 0x829a;
+        const F_NUMBER: u16 = 0x829d;
+        const SENSITIVITY: u16 = 0x8827;
+        // The tag's value for a sensitivity that 16 bits do not hold.
+        const BEYOND: usize = 65535;
+        let directory = self.directory()?;
+        let fraction = |tag: u16| {
+            let at = self.number(self.value(directory, tag)?, 4)?;
+            let [above, below] = [at, at.checked_add(4)?].map(|at| self.number(at, 4));
+            Some(above? as f64 / below? as f64)
+        };
+        let iso = self.number(self.value(directory, SENSITIVITY)?, 2).filter(|iso| *iso != BEYOND)?;
+        let found = CameraExposure { time_s: fraction(EXPOSURE_TIME)?, iso: iso as f64, f_number: fraction(F_NUMBER)? };
+        found.is_sound().then_some(found)
     }
 }
 
@@ -401,19 +475,60 @@ mod tests {
                 (0xffff, b"R98\0", "not sRGB"),
                 (1, b"R03\0", "Adobe RGB"),
             ] {
-                let found = exif_color_space(&exif(space, index, is_little));
+                let found = Exif(exif(space, index, is_little)).color_space();
                 assert!(found.is_some_and(|found| found.contains(word)), "{space} {index:?}");
             }
-            assert_eq!(exif_color_space(&exif(1, b"R98\0", is_little)), None);
+            assert_eq!(Exif(exif(1, b"R98\0", is_little)).color_space(), None);
         }
         for bad in [b"".as_slice(), b"II", b"MM\0*\xff\xff\xff\xff", b"II*\0\x08\0\0\0\xff\xff"] {
-            assert_eq!(exif_color_space(bad), None);
+            assert_eq!(Exif(bad.to_vec()).color_space(), None);
         }
         let mut jpeg = Vec::new();
         let mut encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
         image::ImageEncoder::set_exif_metadata(&mut encoder, exif(0xffff, b"R03\0", true)).unwrap();
         image::ImageEncoder::write_image(encoder, &[90; 8 * 8 * 3], 8, 8, image::ExtendedColorType::Rgb8).unwrap();
         assert!(refusal(&jpeg).contains("Adobe RGB"), "{}", refusal(&jpeg));
+    }
+
+    /// 1/50 s at ISO 400 and f/2.8 in both byte orders, and from a JPEG; a part that is missing or 0 leaves none.
+    #[test]
+    fn an_exposure_is_read_from_exif_data() {
+        let exif = |is_little: bool, time: [u32; 2], iso: u32, tags: u32| {
+            let order = |bytes: Vec<u8>| if is_little { bytes } else { bytes.into_iter().rev().collect() };
+            let [short, long] = [2, 4].map(|length| move |value: u32| order(value.to_le_bytes()[..length].to_vec()));
+            let entry = |tag: u32, kind: u32, value: Vec<u8>| {
+                let mut bytes = [short(tag), short(kind), long(1), value].concat();
+                bytes.resize(12, 0);
+                bytes
+            };
+            let start = if is_little { b"II".to_vec() } else { b"MM".to_vec() };
+            let entries = [entry(0x829a, 5, long(68)), entry(0x829d, 5, long(76)), entry(0x8827, 3, short(iso))];
+            [
+                [start, short(42), long(8)].concat(),
+                [short(1), entry(0x8769, 4, long(26)), long(0)].concat(),
+                [short(tags), entries.concat(), long(0)].concat(),
+                [long(time[0]), long(time[1]), long(28), long(10)].concat(),
+            ]
+            .concat()
+        };
+        let expected = Some(CameraExposure { time_s: 0.02, iso: 400.0, f_number: 2.8 });
+        for is_little in [true, false] {
+            let of = |time: [u32; 2], iso: u32, tags: u32| Exif(exif(is_little, time, iso, tags)).exposure();
+            assert_eq!(of([1, 50], 400, 3), expected);
+            for (time, iso, tags) in [([0, 50], 400, 3), ([1, 0], 400, 3), ([1, 50], 65535, 3), ([1, 50], 400, 2)] {
+                assert_eq!(of(time, iso, tags), None, "{time:?} {iso} {tags}");
+            }
+            let whole = exif(is_little, [1, 50], 400, 3);
+            for length in 0..whole.len() {
+                assert_eq!(Exif(whole[..length].to_vec()).exposure(), None, "{length} bytes");
+            }
+        }
+        let mut jpeg = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
+        image::ImageEncoder::set_exif_metadata(&mut encoder, exif(true, [1, 50], 400, 3)).unwrap();
+        image::ImageEncoder::write_image(encoder, &[90; 8 * 8 * 3], 8, 8, image::ExtendedColorType::Rgb8).unwrap();
+        let photo = crate::photo::PhotoFile::of_bytes(Path::new("a.jpg"), jpeg).unwrap();
+        assert_eq!(photo.exposure(), expected);
     }
 
     #[test]

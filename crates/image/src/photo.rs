@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::color_profile::{CHROMATICITY_TOLERANCE, Profile, REC709, is_cmyk_jpeg};
+pub use crate::color_profile::CameraExposure;
+use crate::color_profile::{CHROMATICITY_TOLERANCE, Exif, Profile, REC709, is_cmyk_jpeg};
 use crate::npy_io::NPY_SIGNATURE;
 use crate::texture_io::{
     CMYK, Encoding, FewerBits, is_turned, photo_of_tiff, texture_and_alpha_of_bytes, transparent_share,
@@ -15,6 +16,7 @@ pub struct PhotoFile {
     pixels: Texture,
     encoding: Encoding,
     transparent: f64,
+    exposure: Option<CameraExposure>,
 }
 
 impl PhotoFile {
@@ -35,6 +37,7 @@ impl PhotoFile {
             return Err(ImageError::Unsupported { path: path.to_owned(), what });
         }
         let profile = Profile::of(path, &bytes)?;
+        let exposure = Exif::of(&bytes).exposure();
         if is_cmyk_jpeg(&bytes) {
             return Err(ImageError::unsupported(path, CMYK));
         }
@@ -58,7 +61,7 @@ impl PhotoFile {
         }
         let transparent = alpha.map_or(0.0, |alpha| transparent_share(&alpha));
         if let Some(pixels) = profile.and_then(|profile| converted(&pixels, &profile)).transpose()? {
-            return Ok(Self { pixels, encoding: Encoding::Srgb, transparent });
+            return Ok(Self { pixels, encoding: Encoding::Srgb, transparent, exposure });
         }
         let mut encoding = Encoding::Srgb;
         if let Texels::Linear(values) = pixels.texels() {
@@ -69,12 +72,17 @@ impl PhotoFile {
                 return Err(invalid(what));
             }
         }
-        Ok(Self { pixels, encoding, transparent })
+        Ok(Self { pixels, encoding, transparent, exposure })
     }
 
     /// How the file states its values: integers are sRGB or by a colour profile, floating-point numbers are linear.
     pub fn encoding(&self) -> Encoding {
         self.encoding
+    }
+
+    /// The exposure that the file's EXIF data states.
+    pub fn exposure(&self) -> Option<CameraExposure> {
+        self.exposure
     }
 
     /// The share of pixels whose alpha is below 1; their colours are used as they are stored.
@@ -348,6 +356,15 @@ mod tests {
         for (tag, value) in [(Tag::SubIfd, 8), (Tag::Unknown(50706), 1), (Tag::NewSubfileType, 1)] {
             let error = read(tiff_of::<colortype::RGB16>(&words, Some((tag, value)))).unwrap_err().to_string();
             assert!(error.contains("raw file"), "{tag:?}: {error}");
+        }
+        // A mosaic of colour filters and linear raw; the twin is grey.
+        for (photometric, is_raw) in [(32803, true), (34892, true), (1, false)] {
+            let tag = (Tag::PhotometricInterpretation, photometric);
+            let found = read(tiff_of::<colortype::Gray16>(&words[..3], Some(tag)));
+            let error = found.err().map(|error| error.to_string());
+            assert_eq!(error.is_some(), is_raw, "{photometric}: {error:?}");
+            let names_it = error.is_none_or(|error| error.contains("raw file behind colour filters"));
+            assert!(names_it, "{photometric}");
         }
         let damaged = read(tiff_of::<colortype::RGB16>(&words, Some((Tag::IccProfile, 7)))).unwrap_err().to_string();
         assert!(damaged.contains("colour profile"), "{damaged}");

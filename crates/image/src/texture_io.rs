@@ -12,6 +12,7 @@ use mateval_files::FileError;
 use mateval_files::untrusted::hint;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
+use tiff::{TiffError, TiffUnsupportedError};
 
 use crate::color_profile::UNREADABLE;
 use crate::exr_io::{self, EXR_SIGNATURE};
@@ -55,21 +56,23 @@ pub fn texture_and_alpha_of_bytes(
 /// raw files are TIFF as well, whose first picture is a thumbnail: they are refused, as is every file of several pictures.
 pub(crate) fn photo_of_tiff(path: &Path, bytes: &[u8]) -> Result<(Texture, Option<Texture>), ImageError> {
     const DNG_VERSION: Tag = Tag::Unknown(50706);
-    const COLOR_FILTERS: u32 = 32803;
-    const LINEAR_RAW: u32 = 34892;
+    const MOSAIC_SIZE: Tag = Tag::Unknown(33421);
     let invalid = |error: &dyn std::fmt::Display| ImageError::invalid(path, format!("not a valid TIFF: {error}"));
-    let mut tags = Decoder::new(Cursor::new(bytes)).map_err(|error| invalid(&error))?;
-    let mut unsigned = |tag| tags.find_tag_unsigned::<u32>(tag).map_err(|error| invalid(&error));
-    let is_reduced = unsigned(Tag::NewSubfileType)?.is_some_and(|of| of & 1 == 1);
-    let photometric = unsigned(Tag::PhotometricInterpretation)?;
+    // The decoder knows no mosaic of colour filters (photometric interpretation 32803) and no linear raw (34892).
+    let mut tags = Decoder::new(Cursor::new(bytes)).map_err(|error| match error {
+        TiffError::UnsupportedError(TiffUnsupportedError::UnknownInterpretation) => {
+            let what = "its pixels are neither grey nor RGB, as in a camera's raw file behind colour filters; develop \
+                        it, and save it as PNG or as a TIFF in RGB";
+            ImageError::unsupported(path, what.to_owned())
+        }
+        other => invalid(&other),
+    })?;
+    let subfile = tags.find_tag_unsigned::<u32>(Tag::NewSubfileType).map_err(|error| invalid(&error))?;
+    let is_reduced = subfile.is_some_and(|of| of & 1 == 1);
     // A tag that cannot be read is stated, too.
     let states = |tags: &mut Decoder<_>, tag| !matches!(tags.find_tag(tag), Ok(None));
-    if is_reduced
-        || tags.more_images()
-        || states(&mut tags, DNG_VERSION)
-        || states(&mut tags, Tag::SubIfd)
-        || photometric.is_some_and(|of| [COLOR_FILTERS, LINEAR_RAW].contains(&of))
-    {
+    let is_raw = [DNG_VERSION, MOSAIC_SIZE, Tag::SubIfd].into_iter().any(|tag| states(&mut tags, tag));
+    if is_reduced || tags.more_images() || is_raw {
         let what = "a camera's raw file, or a TIFF of several pictures; develop it, and save it as PNG or as a TIFF of \
                     one picture";
         return Err(ImageError::unsupported(path, what.to_owned()));
@@ -79,11 +82,18 @@ pub(crate) fn photo_of_tiff(path: &Path, bytes: &[u8]) -> Result<(Texture, Optio
     if profile.is_err() {
         return Err(ImageError::unsupported(path, format!("its colour profile {UNREADABLE}")));
     }
-    let mut decoder = TiffDecoder::new(Cursor::new(bytes)).map_err(|error| invalid(&error))?;
+    let kind = "save it as a PNG or TIFF in grey or RGB, with 8 or 16 bits a channel";
+    let mut decoder = TiffDecoder::new(Cursor::new(bytes)).map_err(|error| match error {
+        image::ImageError::Unsupported(error) => ImageError::unsupported(path, format!("{error}; {kind}")),
+        other => invalid(&other),
+    })?;
     // Those that `ImageReader` sets for other formats.
     decoder.set_limits(image::Limits::default()).map_err(|error| invalid(&error))?;
     if matches!(decoder.original_color_type(), ExtendedColorType::Cmyk8 | ExtendedColorType::Cmyk16) {
         return Err(ImageError::unsupported(path, CMYK.to_owned()));
+    }
+    if decoder.original_color_type() == ExtendedColorType::L1 {
+        return Err(ImageError::unsupported(path, format!("its pixels have one bit; {kind}")));
     }
     with_alpha(path, decoded(path, decoder)?, Encoding::Srgb, Wrap::Clamp)
 }

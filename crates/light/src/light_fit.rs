@@ -47,16 +47,20 @@ pub struct FitTarget<'a> {
     pub mask: Option<&'a Mask>,
     /// The factor by which the photo is multiplied before it is clipped to 1, above 0.
     pub exposure: f64,
+    /// The weights of the last groups of the basis, which are known and not fitted.
+    pub known: &'a [[f64; 3]],
 }
 
 /// Weights for a light basis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightFit {
-    /// Red, green and blue of each light group, not negative; they multiply the scene's own radiances.
+    /// Red, green and blue of each light group, not negative; they multiply the scene's own radiances. Known weights
+    /// are as they were given.
     pub weights: Vec<[f64; 3]>,
     /// The weight of all lights that the ridge pulls towards, for each channel.
     pub start: [f64; 3],
-    /// The solution of the fit for red, green and blue, as multiples of the start, each with its proof.
+    /// The solution of the fit for red, green and blue, as multiples of the start, each with its proof. Groups of known
+    /// weights have no part in it.
     pub channels: [RidgeFit; 3],
     /// The number of squares that the picture is divided into.
     pub squares: usize,
@@ -66,11 +70,12 @@ pub struct LightFit {
 
 /// Fits the basis to the photo.
 ///
-/// Fails if sizes differ, if ridge or exposure are not above 0, if no weights are found, or if a picture holds values
-/// that light cannot have: values that are not finite. The basis may be negative where noise was taken off it.
+/// Fails if sizes differ, if ridge or exposure are not above 0, if more weights are known than the basis has groups, if
+/// no weights are found, or if a picture holds values that light cannot have: values that are not finite. The basis may
+/// be negative where noise was taken off it.
 pub fn fit_lights(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result<LightFit, LightError> {
     check(rules, basis, target)?;
-    let lights = basis.pictures().len();
+    let lights = basis.pictures().len() - target.known.len();
     let squares = [target.photo.width(), target.photo.height()].map(|side| side.div_ceil(rules.pool.max(1) as usize));
     let fits = [0, 1, 2].map(|channel| ChannelFit::new(rules, basis, target, channel));
     let numbers = fits.iter().flat_map(|fit| fit.solution.multiples.iter().chain([&fit.gap, &fit.start]));
@@ -82,7 +87,7 @@ pub fn fit_lights(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) 
     }
     let weight = |light: usize| [0, 1, 2].map(|channel| fits[channel].solution.multiples[light] * fits[channel].start);
     Ok(LightFit {
-        weights: (0..lights).map(weight).collect(),
+        weights: (0..lights).map(weight).chain(target.known.iter().copied()).collect(),
         start: [0, 1, 2].map(|channel| fits[channel].start),
         squares: squares[0] * squares[1],
         relative_gap: fits.iter().map(|fit| fit.gap).fold(0.0, f64::max),
@@ -100,8 +105,13 @@ struct ChannelFit {
 impl ChannelFit {
     fn new(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>, channel: usize) -> Self {
         let rows = Rows::new(rules, target, channel);
-        let photo = rows.of_photo();
+        let mut photo = rows.of_photo();
         let mut columns: Vec<Vec<f64>> = basis.pictures().iter().map(|picture| rows.of(picture)).collect();
+        // Take the known lights off the photo.
+        let known = columns.split_off(columns.len() - target.known.len());
+        for (column, weight) in known.iter().zip(target.known) {
+            photo.iter_mut().zip(column).for_each(|(photo, light)| *photo -= weight[channel] * light);
+        }
         // The start: one weight for all lights with which the means agree; 0 where nothing is lit.
         let light: f64 = columns.iter().flatten().sum();
         let start = if light > 0.0 { photo.iter().sum::<f64>().max(0.0) / light } else { 0.0 };
@@ -116,7 +126,14 @@ impl ChannelFit {
 }
 
 fn check(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result<(), LightError> {
-    let &FitTarget { photo: target, mask, exposure } = target;
+    let &FitTarget { photo: target, mask, exposure, known } = target;
+    if known.len() > basis.pictures().len() {
+        let (known, groups) = (known.len(), basis.pictures().len());
+        return Err(LightError(format!("{known} weights are known, and the basis has {groups} light groups")));
+    }
+    if let Some(weight) = known.iter().flatten().find(|weight| !(0.0..f64::INFINITY).contains(*weight)) {
+        return Err(LightError(format!("a known weight is {weight}, expected a finite number of at least 0")));
+    }
     for (what, value) in [("ridge", rules.ridge), ("exposure", exposure)] {
         if !(value.is_finite() && value > 0.0) {
             return Err(LightError(format!("the {what} is {value}, expected a finite number above 0")));
@@ -213,7 +230,7 @@ pub struct FittedRadiances {
 pub struct FittedRadiance {
     /// The light's name.
     pub light: String,
-    /// Linear Rec. 709.
+    /// Linear Rec. 709. Of a flash it is the radiant intensity, in this unit times square metres.
     pub radiance: [f64; 3],
     /// Half the difference between both fits: a sample of the noise of `radiance`.
     pub spread: [f64; 3],
@@ -335,7 +352,7 @@ mod tests {
 
     /// A photo that nothing clips.
     fn faint<'a>(photo: &'a Picture<LinearRgb>, mask: Option<&'a Mask>) -> FitTarget<'a> {
-        FitTarget { photo, mask, exposure: 1e-3 }
+        FitTarget { photo, mask, exposure: 1e-3, known: &[] }
     }
 
     const WEIGHTS: [[f64; 3]; 3] = [[0.5, 2.0, 0.0], [1.0, 0.0, 3.0], [0.0, 0.25, 1.0]];
@@ -351,6 +368,25 @@ mod tests {
         let fit = fit_lights(&rules(), &basis(), &faint(&photo, None)).unwrap();
         assert!(error(&fit) < 1e-5, "{:?}", fit.weights);
         assert!(fit.relative_gap < 1e-6, "{}", fit.relative_gap);
+    }
+
+    /// A known light keeps its weight, and the others are fitted to what it leaves, also where the photo is clipped. A
+    /// wrong weight makes the others wrong; too many and impossible ones are refused.
+    #[test]
+    fn known_weights_are_kept() {
+        let photo = basis().weighted(&WEIGHTS).unwrap();
+        let fit = |known: &[[f64; 3]], exposure: f64| {
+            fit_lights(&rules(), &basis(), &FitTarget { known, exposure, ..faint(&photo, None) })
+        };
+        for exposure in [1e-3, 0.8] {
+            assert!(error(&fit(&WEIGHTS[2..], exposure).unwrap()) < 1e-4, "{exposure}");
+        }
+        let all = fit(&WEIGHTS, 1e-3).unwrap();
+        assert!(all.weights == WEIGHTS && all.channels.iter().all(|channel| channel.misfit < 1e-4), "{all:?}");
+        let wrong = fit(&[[3.0, 1.0, 0.0]], 1e-3).unwrap();
+        assert!(wrong.weights[2] == [3.0, 1.0, 0.0] && wrong.weights[1][0] < 0.5, "the twin passes: {wrong:?}");
+        assert!(fit(&[[1.0; 3]; 4], 1e-3).unwrap_err().to_string().contains("4 weights are known"));
+        assert!(fit(&[[-1.0; 3]], 1e-3).unwrap_err().to_string().contains("a known weight is -1"));
     }
 
     /// A window that no light of the basis explains does not count when it is masked out, and does when it fills half.
@@ -378,7 +414,7 @@ mod tests {
             )
         };
         let fit = |photo: &Picture<LinearRgb>, exposure: f64| {
-            fit_lights(&FitRules::default(), &basis(), &FitTarget { photo, mask: None, exposure }).unwrap()
+            fit_lights(&FitRules::default(), &basis(), &FitTarget { exposure, ..faint(photo, None) }).unwrap()
         };
         // The brightest pixel of the plain photo is below 2.1.
         let [low, high] = [3.0, 30.0].map(|value| fit(&with(value), 0.4));

@@ -1,8 +1,10 @@
 //! Positions of lights in a room whose own lamps are unknown.
 //!
 //! In: a world, its architecture, the cameras of all views. Out: named quads: a grid under the ceiling, one quad behind
-//! the camera, one in front of each wall that no view sees. The layout follows PSDR-Room (Yan et al., SIGGRAPH Asia
-//! 2023), whose constants are not published; ours are [`StageRules`]. No light lies in a view, and none casts a shadow.
+//! the camera, one in front of each wall that no view sees. A captured room may have a flash, too ([`flash_light`]).
+//!
+//! The layout follows PSDR-Room (Yan et al., SIGGRAPH Asia 2023), whose constants are not published; ours are
+//! [`StageRules`]. No light lies in a view, and none casts a shadow.
 //!
 //! A wall is an upright piece of the architecture, in one plane and connected. It grows from the largest triangle that
 //! belongs to none yet. It takes in every triangle of that triangle's plane that is connected with it: no farther from
@@ -10,7 +12,7 @@
 //! different rooms are different walls.
 
 use glam::{DVec2, DVec3, Vec3};
-use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::dataset::{Flash, SceneFile};
 use mateval_dataset::{Camera, TriangleMesh};
 use mateval_tracer::{Ray, StageLight, World};
 use serde::{Deserialize, Serialize};
@@ -80,11 +82,46 @@ pub struct NamedLight {
 
 /// The lights of a scene's stage, for all views of the scene from the input camera's place: a stage does not depend on
 /// wide views. Instances that belong to the building may be walls; no other instance is one. `world` holds a surface
-/// for each instance, in the order of the instances.
+/// for each instance, in the order of the instances. A scene whose only light is a flash has none.
 pub fn scene_lights(rules: &StageRules, scene: &SceneFile, world: &World) -> Vec<NamedLight> {
+    if scene.flash.as_ref().is_some_and(|flash| flash.only_light) {
+        return Vec::new();
+    }
     let views = scene.views.iter().filter(|view| !view.id.is_wide());
     let cameras: Vec<Camera> = views.map(|view| view.camera).collect();
     lights(rules, world, &scene.architecture(), &cameras)
+}
+
+/// The name of a flash among the lights of a scene.
+pub const FLASH: &str = "flash";
+/// The radius of the sphere that stands for a flash, in metres: small against its distance from what it lights.
+const FLASH_RADIUS_M: f64 = 0.005;
+
+/// The flash at a camera, of radiant intensity 1 in every direction: a small sphere.
+pub fn flash_light(flash: &Flash, camera: &Camera) -> StageLight {
+    let centre = camera.position() + camera.rotation() * DVec3::from_array(flash.offset_m);
+    // An octahedron whose triangles are divided into four, three times, with all corners on the sphere. Its intensity
+    // differs by less than 1 % between directions and their mean.
+    let sides = [DVec3::X, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Z];
+    let mut triangles: Vec<[DVec3; 3]> = (0..4)
+        .flat_map(|k| {
+            let [a, b] = [sides[k], sides[(k + 1) % 4]];
+            [[a, DVec3::Y, b], [b, DVec3::NEG_Y, a]]
+        })
+        .collect();
+    for _ in 0..3 {
+        let quarters = |[a, b, c]: [DVec3; 3]| {
+            let [ab, bc, ca] = [a + b, b + c, c + a].map(DVec3::normalize);
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        };
+        triangles = triangles.into_iter().flat_map(quarters).collect();
+    }
+    let positions = triangles.iter().flatten().map(|at| (centre + *at * FLASH_RADIUS_M).as_vec3()).collect();
+    let triangles = (0..triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
+    let mesh = TriangleMesh { positions, triangles, ..Default::default() };
+    // The mean projected area of a convex body is a quarter of its surface (Cauchy), so the mean intensity is 1.
+    let radiance = (4.0 / mesh.area()) as f32;
+    StageLight { mesh, radiance: [radiance; 3], is_flash: true }
 }
 
 /// The lights of a stage. `architecture` lists the surfaces of the world that may be walls. `cameras` holds the cameras
@@ -228,6 +265,12 @@ impl Upright {
         (normal.y.abs() <= rules.upright_sine).then_some(Self { corners, normal, area: 0.5 * cross.length() })
     }
 
+    /// Its smallest and largest coordinates.
+    fn bounds(&self) -> [DVec3; 2] {
+        let [a, b, c] = self.corners;
+        [a.min(b).min(c), a.max(b).max(c)]
+    }
+
     /// Whether `other` lies in the plane of this triangle, whichever way it faces.
     fn is_coplanar(&self, rules: &StageRules, other: &Self) -> bool {
         let is_near = |corner: &DVec3| (*corner - self.corners[0]).dot(self.normal).abs() <= rules.same_plane_m;
@@ -238,44 +281,119 @@ impl Upright {
 /// The rectangle around each wall of at least [`StageRules::least_wall_m`] in width and height; the wall with the
 /// largest triangle first.
 fn walls(rules: &StageRules, triangles: impl Iterator<Item = [DVec3; 3]>) -> Vec<Rectangle> {
-    let mut rest: Vec<Upright> = triangles.filter_map(|corners| Upright::new(rules, corners)).collect();
-    rest.sort_by(|a, b| b.area.total_cmp(&a.area));
+    let mut all: Vec<Upright> = triangles.filter_map(|corners| Upright::new(rules, corners)).collect();
+    all.sort_by(|a, b| b.area.total_cmp(&a.area));
+    walls_among(rules, &all, &BoxTree::new(all.iter().map(Upright::bounds).collect()))
+}
+
+/// The rectangles of [`walls`], of triangles in the order of their area, the largest first. `tree` holds their bounds.
+fn walls_among(rules: &StageRules, all: &[Upright], tree: &BoxTree) -> Vec<Rectangle> {
+    let mut taken = vec![false; all.len()];
     let mut walls = Vec::new();
-    while !rest.is_empty() {
-        let seed = rest.remove(0);
-        walls.extend(grown(rules, &seed, &mut rest));
+    for seed in 0..all.len() {
+        if !taken[seed] {
+            walls.extend(grown(rules, all, tree, seed, &mut taken));
+        }
     }
     walls
 }
 
-/// Takes the triangles of the wall around `seed` out of `rest`; returns the rectangle around them if it is large
+/// Marks the triangles of the wall around number `first` as taken; returns the rectangle around them if it is large
 /// enough.
-fn grown(rules: &StageRules, seed: &Upright, rest: &mut Vec<Upright>) -> Option<Rectangle> {
+fn grown(rules: &StageRules, all: &[Upright], tree: &BoxTree, first: usize, taken: &mut [bool]) -> Option<Rectangle> {
+    let seed = &all[first];
     let up = (DVec3::Y - seed.normal * seed.normal.y).normalize();
     let along = up.cross(seed.normal);
     let flat = |triangle: &Upright| triangle.corners.map(|corner| DVec2::new(corner.dot(along), corner.dot(up)));
-    let (mut coplanar, others): (Vec<_>, Vec<_>) =
-        rest.drain(..).partition(|triangle| seed.is_coplanar(rules, triangle));
-    *rest = others;
-    // Take in what is near any triangle of the wall until nothing is.
-    let mut wall = vec![flat(seed)];
-    let mut done = 0;
-    while done < wall.len() {
-        let (near, far): (Vec<_>, Vec<_>) =
-            coplanar.into_iter().partition(|other| distance(&wall[done], &flat(other)) <= rules.same_plane_m);
-        wall.extend(near.iter().map(flat));
-        coplanar = far;
+    // Take in what is near any triangle of the wall until nothing is. Triangles whose gap within the plane is at most
+    // the tolerance are less than three times that apart in space: each is at most the tolerance from the plane.
+    let reach = DVec3::splat(3.0 * rules.same_plane_m);
+    taken[first] = true;
+    let (mut wall, mut done, mut near) = (vec![first], 0, Vec::new());
+    while let Some(&at) = wall.get(done) {
+        let (own, [low, high]) = (flat(&all[at]), all[at].bounds());
+        near.clear();
+        tree.meeting([low - reach, high + reach], &mut near);
+        for &other in &near {
+            let triangle = &all[other];
+            let is_next = || seed.is_coplanar(rules, triangle) && distance(&own, &flat(triangle)) <= rules.same_plane_m;
+            if !taken[other] && is_next() {
+                taken[other] = true;
+                wall.push(other);
+            }
+        }
         done += 1;
     }
-    rest.extend(coplanar);
-    rest.sort_by(|a, b| b.area.total_cmp(&a.area));
     // The rectangle around the wall.
-    let corners = || wall.iter().flatten().copied();
+    let corners = || wall.iter().flat_map(|&at| flat(&all[at]));
     let low = corners().reduce(DVec2::min)?;
     let high = corners().reduce(DVec2::max)?;
     let size = high - low;
     let corner = seed.normal * seed.corners[0].dot(seed.normal) + along * low.x + up * low.y;
     (size.min_element() >= rules.least_wall_m).then_some(Rectangle { corner, sides: [along * size.x, up * size.y] })
+}
+
+/// A binary tree of axis-aligned boxes, each as its smallest and largest coordinates. A node's boxes are halved along
+/// the longest axis of the box around them. Walls of scans have a million triangles.
+struct BoxTree {
+    boxes: Vec<[DVec3; 2]>,
+    /// The numbers of the boxes, in an order in which those of every node are neighbours.
+    order: Vec<usize>,
+    /// The box around each node; node k has the children 2 k and 2 k + 1, and the root is number 1.
+    nodes: Vec<[DVec3; 2]>,
+}
+
+impl BoxTree {
+    /// The most boxes of a leaf.
+    const LEAF: usize = 8;
+
+    fn new(boxes: Vec<[DVec3; 2]>) -> Self {
+        // Halving leaves at most LEAF boxes at this depth.
+        let nodes = 2 * boxes.len().div_ceil(Self::LEAF).next_power_of_two();
+        let mut tree = Self { order: Vec::new(), nodes: vec![[DVec3::ZERO; 2]; nodes], boxes };
+        let mut order: Vec<usize> = (0..tree.boxes.len()).collect();
+        tree.build(1, &mut order);
+        tree.order = order;
+        tree
+    }
+
+    fn build(&mut self, node: usize, order: &mut [usize]) {
+        let around = |all: [DVec3; 2], at: &usize| {
+            let [low, high] = self.boxes[*at];
+            [all[0].min(low), all[1].max(high)]
+        };
+        let [low, high] = order.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+        self.nodes[node] = [low, high];
+        if order.len() <= Self::LEAF {
+            return;
+        }
+        let axis = (high - low).max_position();
+        let middle = |at: &usize| self.boxes[*at][0][axis] + self.boxes[*at][1][axis];
+        let half = order.len() / 2;
+        order.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)).then(a.cmp(b)));
+        let (left, right) = order.split_at_mut(half);
+        self.build(2 * node, left);
+        self.build(2 * node + 1, right);
+    }
+
+    /// Adds the numbers of the boxes that meet `wanted` to `found`.
+    fn meeting(&self, wanted: [DVec3; 2], found: &mut Vec<usize>) {
+        self.meeting_in(1, &self.order, &wanted, found);
+    }
+
+    fn meeting_in(&self, node: usize, order: &[usize], wanted: &[DVec3; 2], found: &mut Vec<usize>) {
+        let meets = |[low, high]: &[DVec3; 2]| low.cmple(wanted[1]).all() && high.cmpge(wanted[0]).all();
+        if !meets(&self.nodes[node]) {
+            return;
+        }
+        if order.len() <= Self::LEAF {
+            found.extend(order.iter().filter(|at| meets(&self.boxes[**at])));
+            return;
+        }
+        let (left, right) = order.split_at(order.len() / 2);
+        self.meeting_in(2 * node, left, wanted, found);
+        self.meeting_in(2 * node + 1, right, wanted, found);
+    }
 }
 
 /// The distance of two triangles in a plane; 0 where they overlap.
@@ -338,7 +456,7 @@ impl Rectangle {
         let positions = self.corners().map(|corner| corner.as_vec3()).to_vec();
         let triangles = if turned { vec![[0, 2, 1], [0, 3, 2]] } else { vec![[0, 1, 2], [0, 2, 3]] };
         let mesh = TriangleMesh { positions, triangles, ..Default::default() };
-        StageLight { mesh, radiance: [1.0; 3] }
+        StageLight { mesh, radiance: [1.0; 3], is_flash: false }
     }
 
     /// Whether any of the rectangle is in the camera's picture, occlusion aside: clips the rectangle at each side of
@@ -393,10 +511,50 @@ fn frustum(camera: &Camera) -> [DVec3; 4] {
 mod tests {
     use std::sync::Arc;
 
-    use mateval_dataset::Intrinsics;
-    use mateval_testkit::scenes::{WALLS, box_camera, box_quad, box_room};
+    use mateval_dataset::{Intrinsics, splitmix64};
+    use mateval_testkit::scenes::{Builder, WALLS, box_camera, box_quad, box_room, camera, grey};
+    use mateval_tracer::{RenderSettings, render};
 
     use super::*;
+
+    fn flash(offset_m: [f64; 3]) -> Flash {
+        Flash { offset_m, intensity: None, views: Vec::new(), only_light: false }
+    }
+
+    /// A floor of albedo a, lit by a flash of intensity 1 from the distance d at the angle t to its normal, has the
+    /// radiance a cos t / (pi d^2).
+    #[test]
+    fn the_light_of_a_flash_falls_off_with_the_square_of_the_distance() {
+        let floor = box_quad([-8.0, 0.0, -8.0], [0.0, 0.0, 16.0], [16.0, 0.0, 0.0]);
+        let world = Builder::default().surface(floor, grey(0.5)).world();
+        for height in [0.5_f64, 2.0] {
+            let camera = camera([0.0, height, 0.0], [0.0; 3], 9, 0.5);
+            let lit = world.on_stage(&[flash_light(&flash([0.3, 0.0, 0.0]), &camera)]).unwrap();
+            let settings = RenderSettings { samples: 1024, ..RenderSettings::default() };
+            let picture = render(&lit, &camera, &settings, &|_, _| ()).unwrap().picture;
+            let sum: f64 = picture.pixels().iter().map(|pixel| f64::from(pixel.0[1])).sum();
+            let (found, distance) = (sum / picture.pixels().len() as f64, height.hypot(0.3));
+            let expected = 0.5 / std::f64::consts::PI * height / distance.powi(3);
+            assert!((found / expected - 1.0).abs() < 0.02, "{height}: {found} {expected}");
+        }
+    }
+
+    /// A camera that looks along +X has +Z to its right, and -X behind it.
+    #[test]
+    fn a_flash_stands_beside_its_camera() {
+        let light = flash_light(&flash([0.1, 0.2, 0.3]), &camera([1.0, 2.0, 3.0], [5.0, 2.0, 3.0], 9, 60.0));
+        let positions = &light.mesh.positions;
+        let middle = positions.iter().map(|place| place.as_dvec3()).sum::<DVec3>() / positions.len() as f64;
+        assert!(middle.distance(DVec3::new(0.7, 2.2, 3.1)) < 1e-5, "{middle}");
+        // Every triangle faces outwards.
+        let outwards = |at: usize| normal_of(&light, at).dot(light.mesh.corners(at)[0].as_dvec3() - middle) > 0.0;
+        assert!(light.mesh.triangles.len() == 512 && (0..512).all(outwards));
+    }
+
+    fn normal_of(light: &StageLight, triangle: usize) -> DVec3 {
+        let [a, b, c] = light.mesh.corners(triangle).map(|corner| corner.as_dvec3());
+        (b - a).cross(c - a)
+    }
 
     fn world(more: Vec<TriangleMesh>) -> World {
         World::new(Arc::new(box_room(more))).unwrap()
@@ -518,6 +676,60 @@ mod tests {
         assert_eq!(found(cross), [[4.0, 2.5]]);
         let parallel = [sheet(1.0, [0.0, 0.0], [4.0, 2.5]), sheet(1.02, [0.0, 0.0], [3.0, 2.5])].concat();
         assert_eq!(found(parallel), [[4.0, 2.5], [3.0, 2.5]]);
+    }
+
+    /// A drawn number from 0 to 1.
+    fn number(index: u64) -> f64 {
+        (splitmix64::number(7, index) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Triangles of drawn places and sizes in two planes; those in one of them lie at two depths within the tolerance.
+    /// With a tree whose boxes all meet, the search tests every pair.
+    #[test]
+    fn the_tree_leaves_out_no_piece_of_a_wall() {
+        let rules = StageRules { least_wall_m: 0.0, ..rules() };
+        let drawn = |k: u64| {
+            let [plane, z, y, width, height] = [0, 1, 2, 3, 4].map(|part| number(6 * k + part));
+            let corner = DVec3::new([1.0, 1.006, 1.5][(3.0 * plane) as usize], 3.0 * y, 6.0 * z);
+            [corner, corner + DVec3::Z * (0.1 + 0.3 * width), corner + DVec3::Y * (0.1 + 0.3 * height)]
+        };
+        let triangles: Vec<[DVec3; 3]> = (0..300).map(drawn).collect();
+        let mut all: Vec<Upright> = triangles.iter().filter_map(|corners| Upright::new(&rules, *corners)).collect();
+        all.sort_by(|a, b| b.area.total_cmp(&a.area));
+        let everywhere = BoxTree::new(vec![[DVec3::splat(-1e3), DVec3::splat(1e3)]; all.len()]);
+        let expected = walls_among(&rules, &all, &everywhere);
+        assert!((60..200).contains(&expected.len()), "{}", expected.len());
+        assert_eq!(walls(&rules, triangles.into_iter()), expected);
+        // The twin: triangles that are only found by their middles.
+        let middles = all.iter().map(|triangle| [triangle.bounds().iter().sum::<DVec3>() / 2.0; 2]).collect();
+        assert_ne!(walls_among(&rules, &all, &BoxTree::new(middles)), expected);
+    }
+
+    /// Among boxes of drawn places and sizes, the tree finds those that a test of every box finds.
+    #[test]
+    fn a_tree_finds_the_boxes_that_a_box_meets() {
+        let drawn = |k: u64| {
+            let [x, y, z, size] = [0, 1, 2, 3].map(|part| number(4 * k + part));
+            let low = DVec3::new(x, y, z) * 10.0;
+            [low, low + DVec3::new(size, size * size, 1.0 - size)]
+        };
+        for count in [0, 1, 8, 9, 1000] {
+            let boxes: Vec<[DVec3; 2]> = (0..count).map(drawn).collect();
+            let tree = BoxTree::new(boxes.clone());
+            let mut most = 0;
+            for wanted in (5000..5200).map(drawn) {
+                let mut found = Vec::new();
+                tree.meeting(wanted, &mut found);
+                found.sort_unstable();
+                let meets = |[low, high]: &[DVec3; 2]| {
+                    (0..3).all(|axis| low[axis] <= wanted[1][axis] && high[axis] >= wanted[0][axis])
+                };
+                let expected: Vec<usize> = (0..boxes.len()).filter(|at| meets(&boxes[*at])).collect();
+                assert_eq!(found, expected);
+                most = most.max(found.len());
+            }
+            assert!(count < 1000 || most > 3, "{most}");
+        }
     }
 
     #[test]

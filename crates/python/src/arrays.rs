@@ -10,13 +10,14 @@ use mateval_image::limits::MAX_PIXELS;
 use mateval_image::transfer::{byte_from_unit, linear_from_srgb};
 use mateval_image::{ImageError, LinearRgb, Mask, Picture, SrgbRgb, png_io};
 use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods as _, PyUntypedArray, PyUntypedArrayMethods as _,
+    AllowTypeChange, Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _,
+    PyUntypedArray, PyUntypedArrayMethods as _,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::long_work::failed;
+use crate::long_work::{failed, wrong_shape};
 
 /// Rows of pixels as an array of shape (height, width), which takes over the picture's memory.
 pub fn plane<'py, T: Element + Copy>(py: Python<'py>, picture: Picture<T>) -> PyResult<Bound<'py, PyArray2<T>>> {
@@ -91,7 +92,7 @@ impl MapInput {
         if count.is_none_or(|count| count > 4 * MAX_PIXELS) {
             let found = array.shape();
             let message = format!("{name}: expected at most {MAX_PIXELS} pixels, found an array of shape {found:?}");
-            return Err(PyValueError::new_err(message));
+            return Err(wrong_shape(message));
         }
         let numbers = if let Some(bytes) = copied::<u8>(array)? {
             Numbers::Bytes(bytes)
@@ -178,12 +179,18 @@ impl MapInput {
 
     /// Fails where the other array has another height or width.
     pub fn check_same_size(&self, other: &Self) -> PyResult<()> {
-        let size = |input: &Self| input.shape.iter().take(2).copied().collect::<Vec<_>>();
-        if size(self) == size(other) {
+        other.check_size_of(self.name, &self.shape)
+    }
+
+    /// Fails where the array `name` of this shape has another height or width.
+    pub fn check_size_of(&self, name: &str, shape: &[usize]) -> PyResult<()> {
+        let size = |shape: &[usize]| shape.iter().take(2).copied().collect::<Vec<_>>();
+        let (expected, found) = (size(&self.shape), size(shape));
+        if expected == found {
             return Ok(());
         }
-        let expected = format!("the height and width of {}, {:?}", other.name, size(other));
-        Err(PyValueError::new_err(format!("{}: expected {expected}, found {:?}", self.name, size(self))))
+        let expected = format!("the height and width of {}, {expected:?}", self.name);
+        Err(wrong_shape(format!("{name}: expected {expected}, found {found:?}; scale one of them")))
     }
 
     fn is_stored(&self) -> bool {
@@ -199,7 +206,7 @@ impl MapInput {
         }
     }
 
-    fn wrong_shape(&self, expected: &str) -> PyErr {
+    pub fn wrong_shape(&self, expected: &str) -> PyErr {
         let advice = match *self.shape.as_slice() {
             [3, height, width] if height != 3 && width != 3 => {
                 "; `numpy.moveaxis(array, 0, -1)` puts the channels last"
@@ -210,7 +217,7 @@ impl MapInput {
             _ => "",
         };
         let (name, found) = (self.name, &self.shape);
-        PyValueError::new_err(format!("{name}: expected the shape {expected}, found {found:?}{advice}"))
+        wrong_shape(format!("{name}: expected the shape {expected}, found {found:?}{advice}"))
     }
 }
 
@@ -221,18 +228,18 @@ pub enum ColoursOrNumbers {
     Numbers(Picture<f32>),
 }
 
-/// A mask. Fails for anything but an array of bool of the shape (height, width).
-pub fn mask_of(given: &Bound<'_, PyAny>) -> PyResult<Mask> {
+/// A mask of a picture. Fails for anything but an array of bool of the shape (height, width), with the picture's size.
+pub fn mask_of(given: &Bound<'_, PyAny>, picture: &MapInput) -> PyResult<Mask> {
     let array = &untyped("mask", given)?;
     let Some(pixels) = copied::<bool>(array)? else {
         return Err(PyTypeError::new_err(format!("mask: expected bool, found {}", array.dtype())));
     };
-    let wrong = || format!("mask: expected the shape (height, width), found {:?}", array.shape());
-    match *array.shape() {
-        [height, width] => Mask::new(width, height, pixels).ok(),
-        _ => None,
-    }
-    .ok_or_else(|| PyValueError::new_err(wrong()))
+    let &[height, width] = array.shape() else {
+        let found = array.shape();
+        return Err(wrong_shape(format!("mask: expected the shape (height, width), found {found:?}")));
+    };
+    picture.check_size_of("mask", array.shape())?;
+    Mask::new(width, height, pixels).map_err(failed)
 }
 
 /// A NumPy array as it is, a tensor of another library as an array.
@@ -242,6 +249,14 @@ fn untyped<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, Py
     }
     let array = given.py().import("mateval.tensors")?.getattr("as_array")?.call1((name, given))?;
     Ok(array.cast_into::<PyUntypedArray>()?)
+}
+
+/// The numbers of an array, a tensor of another library or nested lists.
+pub fn numbers<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyArrayLikeDyn<'py, f64, AllowTypeChange>> {
+    match given.hasattr("detach")? {
+        true => untyped(name, given)?.into_any().extract(),
+        false => given.extract(),
+    }
 }
 
 /// The elements of an array in row-major order, whatever its strides. `None` where it has another dtype.
@@ -260,7 +275,7 @@ fn index_of(mut at: usize, shape: &[usize]) -> Vec<usize> {
     index
 }
 
-/// A picture of bytes, of shape (height, width, 3) or (height, width), as the bytes of a PNG file.
+/// A picture of bytes, of shape (height, width, 3), RGB, or (height, width), as the bytes of a PNG file.
 #[pyfunction]
 pub fn png<'py>(py: Python<'py>, picture: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyBytes>> {
     let input = MapInput::new("picture", picture)?;
@@ -278,7 +293,7 @@ pub fn png<'py>(py: Python<'py>, picture: &Bound<'py, PyAny>) -> PyResult<Bound<
     Ok(PyBytes::new(py, &file.map_err(PyValueError::new_err)?))
 }
 
-/// Linear colours of shape (height, width, 3) as sRGB: uint8 of the same shape, clipped.
+/// Linear colours of shape (height, width, 3) as sRGB: uint8 of the same shape and order of channels, clipped.
 #[pyfunction]
 pub fn srgb_bytes<'py>(py: Python<'py>, picture: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<u8>>> {
     let linear = MapInput::new("picture", picture)?.linear(Some(false))?;

@@ -12,6 +12,7 @@ use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::nn::{NnOptions, lift_scene, seen_pixels};
 use mateval_baselines::procedural::{ProceduralOptions, scene_maps};
 use mateval_baselines::{BaselineError, delight as baseline, maps};
+use mateval_dataset::layout::INPUT;
 use mateval_dataset::submission::MAP_SIZES;
 use mateval_dataset::{PartSetId, Progress};
 use mateval_image::{LinearRgb, Mask, Picture};
@@ -24,12 +25,12 @@ use pyo3::types::PyDict;
 use crate::arrays::{MapInput, plane, triples};
 use crate::dataset::Scene;
 use crate::instance::SharedScene;
-use crate::long_work::{Listener, failed, run_long, shown_in_notebook};
+use crate::long_work::{Listener, failed, run_long, shown_in_notebook, wrong_shape};
 
 /// The maps of an instance, encoded as a submission stores them.
 #[pyclass(frozen, get_all, module = "mateval")]
 pub struct Maps {
-    /// sRGB: (side, side, 3), uint8; None where the estimate has none.
+    /// sRGB: (side, side, 3), uint8, RGB; None where the estimate has none.
     base_color: Option<Py<PyArray3<u8>>>,
     /// Perceptual roughness times 255: (side, side), uint8; None where the estimate has none.
     roughness: Option<Py<PyArray2<u8>>>,
@@ -48,10 +49,11 @@ struct MadeMaps {
 /// Lifts an estimate of the input view to the atlases of all instances that have one: seen texels get the estimate, the
 /// others that of the seen points nearest to them. The maps are those of `mateval baseline nn`.
 ///
-/// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
-/// not be the view's. At least one of them must be given. encoding says how base_color is stored: "linear" or "srgb";
-/// by default floats are linear, and uint8 and uint16 are sRGB. Floats must be finite in every pixel, also where the view is
-/// not valid; they are clipped to 0 to 1.
+/// base_color has the shape (height, width, 3), RGB (not BGR as OpenCV reads it), roughness and metallic (height,
+/// width); all have one size, which need not be the view's. At least one of them must be given. encoding says how
+/// base_color is stored: "linear" or "srgb"; by default floats are linear, and uint8 and uint16 are sRGB. Floats must
+/// be finite in every pixel, also where the view is not valid; they are clipped to 0 to 1. Other shapes, and other
+/// proportions than the view's, raise `mateval.WrongShape`, which is a ValueError.
 ///
 /// neighbours is the number of seen points that an unseen texel is computed from, normal_weight the distance in metres
 /// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side
@@ -76,8 +78,8 @@ pub fn lift<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let listener = Listener::of(py, progress)?;
     let maps = [("base_color", base_color), ("roughness", roughness), ("metallic", metallic)];
-    let estimate = estimate(maps, encoding)?;
     let options = options(neighbours, normal_weight, any_instance, atlas_size)?;
+    let estimate = estimate(scene, maps, encoding)?;
     let source = Arc::clone(&scene.source);
     let all =
         run_long(py, &listener, move |progress| lifted(&source, &estimate, &options, progress))?.map_err(failed)?;
@@ -93,8 +95,12 @@ fn by_id<'py>(py: Python<'py>, scene: &Scene, all: BTreeMap<usize, MadeMaps>) ->
     Ok(by_id)
 }
 
-/// An estimate of pictures of one size.
-fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3], encoding: Option<&str>) -> PyResult<Estimate> {
+/// An estimate of pictures of one size, with the proportions of the input view.
+fn estimate(
+    scene: &Scene,
+    given: [(&'static str, Option<Bound<'_, PyAny>>); 3],
+    encoding: Option<&str>,
+) -> PyResult<Estimate> {
     let is_srgb = match encoding {
         None => None,
         Some("srgb") => Some(true),
@@ -114,12 +120,20 @@ fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3], encoding: Opti
     };
     present.try_for_each(|other| other.check_same_size(first))?;
     let [base_color, roughness, metallic] = &inputs;
-    Ok(Estimate {
+    let estimate = Estimate {
         base_color: base_color.as_ref().map(|map| map.linear(is_srgb)).transpose()?,
         roughness: roughness.as_ref().map(MapInput::plane).transpose()?,
         metallic: metallic.as_ref().map(MapInput::plane).transpose()?,
         ..Estimate::default()
-    })
+    };
+    let scene = scene.source.file();
+    // The baseline itself reports a scene without an input view.
+    if let Some(view) = scene.view(INPUT) {
+        let k = &view.camera.intrinsics;
+        let region = estimate.region(scene.id.as_str(), (k.width as usize, k.height as usize));
+        region.map_err(|error| wrong_shape(error.to_string()))?;
+    }
+    Ok(estimate)
 }
 
 fn options(neighbours: u8, normal_weight_m: f64, any_instance: bool, atlas_size: Option<u32>) -> PyResult<NnOptions> {
@@ -149,11 +163,7 @@ fn lifted(
     lift_scene(&geometry, estimate, &seen, options, progress, |instance, lifted, medians| {
         let given = estimate.given_maps();
         let made = match lifted {
-            Some(lifted) => {
-                let side = lifted.whole.texels.width();
-                let seen = Some(Picture::new(side, side, lifted.seen)?);
-                MadeMaps { maps: maps::Maps::of_atlas(&lifted.whole, given), seen }
-            }
+            Some(lifted) => MadeMaps { maps: lifted.maps, seen: Some(lifted.seen) },
             None => {
                 let side = *MAP_SIZES.start();
                 let maps = maps::Maps::constant(medians.of(&geometry, instance), given);
@@ -168,9 +178,32 @@ fn lifted(
 
 #[pymethods]
 impl Maps {
+    /// The arrays of pickled maps.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, MapArrays)> {
+        let rebuild = py.import("mateval._core")?.getattr("rebuilt_maps")?;
+        let base_color = self.base_color.as_ref().map(|map| map.clone_ref(py));
+        let [roughness, metallic] = [&self.roughness, &self.metallic].map(|map| Some(map.as_ref()?.clone_ref(py)));
+        Ok((rebuild, (base_color, roughness, metallic, self.seen.as_ref().map(|map| map.clone_ref(py)))))
+    }
+
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         shown_in_notebook(slf, "maps")
     }
+}
+
+/// The fields of [`Maps`], in their order.
+type MapArrays =
+    (Option<Py<PyArray3<u8>>>, Option<Py<PyArray2<u8>>>, Option<Py<PyArray2<u8>>>, Option<Py<PyArray2<bool>>>);
+
+/// The copy of pickled maps.
+#[pyfunction]
+pub fn rebuilt_maps(
+    base_color: Option<Py<PyArray3<u8>>>,
+    roughness: Option<Py<PyArray2<u8>>>,
+    metallic: Option<Py<PyArray2<u8>>>,
+    seen: Option<Py<PyArray2<bool>>>,
+) -> Maps {
+    Maps { base_color, roughness, metallic, seen }
 }
 
 impl MadeMaps {
@@ -190,8 +223,8 @@ impl MadeMaps {
 /// the view shows nothing; parts without a pattern have their median. The maps are those of
 /// `mateval baseline procedural`.
 ///
-/// base_color, roughness, metallic and encoding are as `lift` takes them; base_color must be given. `mateval.delight`
-/// makes all maps from the photo.
+/// base_color (RGB), roughness, metallic and encoding are as `lift` takes them; base_color must be given.
+/// `mateval.delight` makes all maps from the photo.
 ///
 /// part_set names the parts; None stands for those of the source. keep_seen keeps the estimate in texels that the input
 /// view shows. detail, 0 to 1, is how much of a pattern's randomness is kept.
@@ -214,7 +247,7 @@ pub fn procedural<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let listener = Listener::of(py, progress)?;
     let maps = [("base_color", base_color), ("roughness", roughness), ("metallic", metallic)];
-    let estimate = estimate(maps, encoding)?;
+    let estimate = estimate(scene, maps, encoding)?;
     let part_set = part_set.map(|name| name.parse::<PartSetId>()).transpose();
     let part_set = part_set.map_err(|fault| PyValueError::new_err(format!("part_set: {fault}")))?;
     let options = ProceduralOptions { part_set, keep_seen, detail, ..ProceduralOptions::default() };
@@ -228,7 +261,7 @@ pub fn procedural<'py>(
     by_id(py, scene, all.map_err(failed)?)
 }
 
-/// A photo without its light. Its pictures are those of the input view.
+/// A photo without its light. Its pictures are those of the input view; colours are RGB.
 #[pyclass(frozen, get_all, module = "mateval")]
 pub struct Delit {
     /// Linear, 0 to 1: (height, width, 3), float32. Black where a pixel is not valid.

@@ -10,7 +10,7 @@ use mateval_dataset::ids::quoted;
 use mateval_dataset::layout::INPUT;
 use mateval_dataset::open;
 use mateval_eval::protocol::Protocol;
-use mateval_eval::shown::scene_light;
+use mateval_eval::shown::{scene_light, scene_lightings};
 use mateval_image::SrgbRgb;
 use mateval_image::transfer::byte_from_unit;
 use pyo3::exceptions::PyValueError;
@@ -21,7 +21,7 @@ use pyo3::types::{PyDict, PyIterator, PyList, PyType};
 use crate::arrays::triples;
 use crate::instance::{Instance, Part, SharedScene};
 use crate::long_work::{Listener, failed, run_long, shown_in_notebook, unknown_id};
-use crate::view::View;
+use crate::view::{View, check_truth_held};
 
 /// A dataset on disk. Opening it checks its JSON files against its manifest; pictures are read when they are used.
 #[pyclass(frozen, subclass, mapping, module = "mateval._core")]
@@ -118,6 +118,9 @@ pub fn scene_place(dataset: &open::Dataset, id: &str) -> PyResult<usize> {
     })
 }
 
+/// The name of a scene's own light, beside its lightings.
+const OWN_LIGHT: &str = "true";
+
 /// A scene of a dataset.
 #[pyclass(frozen, module = "mateval")]
 pub struct Scene {
@@ -163,6 +166,29 @@ impl Scene {
         self.source.file().photo.as_ref().map(|photo| photo.file.as_str())
     }
 
+    /// Whether materials of the source were replaced by others that were drawn with a secret key.
+    #[getter]
+    fn redressed(&self) -> bool {
+        self.source.file().redressed.is_some()
+    }
+
+    /// The lights that `render` takes: "true" for the scene's own, then lightings such as "warm_cool" and "alone_1", in
+    /// which its lights have other weights. Empty for twins and photos from elsewhere, which have no renders. The
+    /// lightings follow from the ground truth, which is read at each access: raises `mateval.Withheld` where the
+    /// dataset does not hold it, and `mateval.Error` where the scene is not rendered yet.
+    #[getter]
+    fn lightings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let (dataset, file) = (&self.source.dataset, self.source.file());
+        if file.photo.is_some() || dataset.file.twins.contains_key(&file.id) {
+            return Ok(Vec::new());
+        }
+        check_truth_held(&self.source, &self.source.folder().truth())?;
+        let protocol = Protocol::named(Protocol::DEFAULT).map_err(failed)?;
+        let found = py.detach(|| scene_lightings(dataset, file, &protocol)).map_err(failed)?;
+        let others = found.iter().map(ToString::to_string);
+        Ok(std::iter::once(OWN_LIGHT.to_owned()).chain(others).collect())
+    }
+
     /// The objects that methods provide textures for, by id, in the order of their index.
     #[getter]
     fn instances(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
@@ -192,13 +218,13 @@ impl Scene {
         Ok(self.views.get_or_try_init(py, all)?.clone_ref(py))
     }
 
-    /// Renders the scene with these maps, as the scorer shows them: by the id of the view, (height, width, 3), uint8, sRGB
-    /// after exposure. The views are those that share the input view's place. The dataset's ground truth is needed.
+    /// Renders the scene with these maps, as the scorer shows them: by the id of the view, (height, width, 3), uint8,
+    /// RGB, sRGB after exposure. The views are those that share the input view's place. The dataset's ground truth is
+    /// needed. Raises `mateval.Error` for a captured room, whose materials and lights are not known.
     ///
     /// maps holds, by the id of the instance, `mateval.Maps` or dictionaries with base_color, roughness and metallic, as
     /// `Submission.write` takes them; or it is the path of a submission. Instances without maps are grey, as they are
-    /// scored. light is "true" or a lighting of the scene, as "warm_cool" or "alone_1". samples is the number of paths
-    /// a pixel in each of two halves.
+    /// scored. light is one of `lightings`. samples is the number of paths a pixel in each of two halves.
     #[pyo3(signature = (maps, *, light="true", samples=16, progress=None))]
     fn render<'py>(
         slf: &Bound<'py, Self>,
@@ -259,10 +285,11 @@ pub fn render<'py>(
     samples: u32,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
+    scene.source.file().check_materials_known().map_err(failed)?;
     let lighting = match light {
-        "true" => None,
+        OWN_LIGHT => None,
         name => Some(name.parse().map_err(|_| {
-            let expected = "'true', 'warm_cool', 'alone_1', 'alone_2', ...";
+            let expected = "a name of `Scene.lightings`, such as 'true' or 'warm_cool'";
             PyValueError::new_err(format!("light: expected {expected}, found '{name}'"))
         })?),
     };
@@ -278,7 +305,8 @@ pub fn render<'py>(
     })?
     .map_err(failed)?;
     if views.is_empty() {
-        return Err(PyValueError::new_err(format!("light: scene '{}' has no lighting '{light}'", scene.id())));
+        let has = "`Scene.lightings` lists those that it has";
+        return Err(PyValueError::new_err(format!("light: scene '{}' has no lighting '{light}'; {has}", scene.id())));
     }
     let pictures = PyDict::new(py);
     for view in views {

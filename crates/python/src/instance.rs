@@ -1,6 +1,7 @@
 //! An instance, its parts and its mesh; and the scene that all Python objects made from it share, which keeps the
 //! meshes.
 
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use mateval_dataset::dataset::SceneFile;
@@ -75,6 +76,13 @@ impl Instance {
     #[getter]
     fn mesh(&self, py: Python<'_>) -> PyResult<Mesh> {
         py.detach(|| self.source.mesh(self.at)).map(Mesh).map_err(failed)
+    }
+
+    /// The paths of a pickled instance: the copy opens the same folder.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (PathBuf, String, String))> {
+        let reopen = py.import("mateval.dataset")?.getattr("reopened_instance")?;
+        let root = std::path::absolute(&self.source.dataset.root)?;
+        Ok((reopen, (root, self.source.file().id.to_string(), self.id.clone())))
     }
 
     fn __repr__(&self) -> String {

@@ -27,7 +27,7 @@ mod _core {
     #[pymodule_export]
     use crate::arrays::{png, srgb_bytes};
     #[pymodule_export]
-    use crate::baselines::{Delit, Maps, delight, lift, procedural};
+    use crate::baselines::{Delit, Maps, delight, lift, procedural, rebuilt_maps};
     #[pymodule_export]
     use crate::dataset::{Dataset, Scene, render};
     #[pymodule_export]
@@ -39,7 +39,7 @@ mod _core {
     #[pymodule_export]
     use crate::submission::Submission;
     #[pymodule_export]
-    use crate::view::{Camera, Truth, View};
+    use crate::view::{Camera, Truth, View, rebuilt_camera};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

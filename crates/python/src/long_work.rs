@@ -205,6 +205,12 @@ pub fn unknown_id(message: String) -> PyErr {
     exception(&CLASS, "UnknownId", message)
 }
 
+/// `mateval.WrongShape`. Not for files, whose shapes the caller did not choose.
+pub fn wrong_shape(message: String) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    exception(&CLASS, "WrongShape", message)
+}
+
 /// `mateval.Withheld`.
 pub fn withheld(message: String) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();

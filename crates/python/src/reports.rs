@@ -22,7 +22,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{ColoursOrNumbers, MapInput, mask_of};
 use crate::dataset::{Dataset, scene_place};
-use crate::long_work::{Listener, failed, run_long};
+use crate::long_work::{Listener, failed, run_long, wrong_shape};
 
 /// Checks a submission, a folder or an archive. Returns the report as JSON, and as text for people.
 #[pyfunction]
@@ -160,6 +160,7 @@ impl ScoreTask {
             only_cached: false,
             pictures: None,
             seen: None,
+            timed: None,
         };
         let results = mateval_eval::score::score(&plan, progress).context("cannot score")?;
         Ok(results.iter().map(json::to_lines).collect())
@@ -173,24 +174,39 @@ enum Pair {
 }
 
 impl Pair {
-    fn new(prediction: &Bound<'_, PyAny>, reference: &Bound<'_, PyAny>) -> PyResult<Self> {
+    /// The pair and the mask of its pixels. Fails where their shapes do not fit.
+    fn with_mask(
+        prediction: &Bound<'_, PyAny>,
+        reference: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Self, Option<Mask>)> {
         let prediction = MapInput::new("prediction", prediction)?;
         let reference = MapInput::new("reference", reference)?;
         reference.check_same_kind(&prediction)?;
         // The peak is 1, so floats of 0 to 255 are refused.
         [&prediction, &reference].into_iter().try_for_each(|array| array.check_range(&BASE_COLOR_RANGE))?;
-        match (prediction.colours_or_numbers()?, reference.colours_or_numbers()?) {
-            (ColoursOrNumbers::Colours(a), ColoursOrNumbers::Colours(b)) => Ok(Self::Colours(a, b)),
-            (ColoursOrNumbers::Numbers(a), ColoursOrNumbers::Numbers(b)) => Ok(Self::Numbers(a, b)),
-            _ => Err(PyValueError::new_err("expected prediction and reference with the same number of axes")),
-        }
+        let pictures = (prediction.colours_or_numbers()?, reference.colours_or_numbers()?);
+        reference.check_same_size(&prediction)?;
+        let mask = mask.map(|mask| mask_of(mask, &prediction)).transpose()?;
+        let pair = match pictures {
+            (ColoursOrNumbers::Colours(a), ColoursOrNumbers::Colours(b)) => Self::Colours(a, b),
+            (ColoursOrNumbers::Numbers(a), ColoursOrNumbers::Numbers(b)) => Self::Numbers(a, b),
+            (ColoursOrNumbers::Colours(_), ColoursOrNumbers::Numbers(_)) => {
+                return Err(reference.wrong_shape("(height, width, 3) of the prediction"));
+            }
+            (ColoursOrNumbers::Numbers(_), ColoursOrNumbers::Colours(_)) => {
+                return Err(reference.wrong_shape("(height, width) of the prediction"));
+            }
+        };
+        Ok((pair, mask))
     }
 }
 
-/// The peak signal-to-noise ratio in dB, at most 100, of arrays of shape (height, width, 3) or (height, width). The peak
-/// is 1, and floats must lie from -1 to 16. Values are compared as they are; uint8 and uint16 are divided by their largest value. The scorer compares
-/// linear values of albedo. Where mask, (height, width) of bool, is given, only its pixels count; None where there are
-/// none.
+/// The peak signal-to-noise ratio in dB, at most 100, of arrays of shape (height, width, 3), RGB (not BGR as OpenCV
+/// reads it), or (height, width). The peak is 1, and floats must lie from -1 to 16. Values are compared as they are;
+/// uint8 and uint16 are divided by their largest value. The scorer compares linear values of albedo. If mask, (height,
+/// width) of bool, is given, only its pixels count; None if it has none. Arrays of different sizes raise
+/// `mateval.WrongShape`, which is a ValueError.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
 pub fn psnr(
@@ -203,7 +219,7 @@ pub fn psnr(
         let error = mse(a, b, mask)?;
         Ok(error.map(Psnr::from_mse).transpose()?.map(|psnr| psnr.db))
     }
-    measured(py, Pair::new(prediction, reference)?, mask, of, of)
+    measured(py, Pair::with_mask(prediction, reference, mask)?, of, of)
 }
 
 /// The structural similarity in windows of 11x11 pixels, of arrays as `psnr` takes them, at least 11 pixels wide and
@@ -223,7 +239,7 @@ pub fn ssim(
             None => mateval_metrics::ssim(a, b).map(Some),
         }
     }
-    measured(py, Pair::new(prediction, reference)?, mask, of, of)
+    measured(py, Pair::with_mask(prediction, reference, mask)?, of, of)
 }
 
 /// A metric of two pictures; `None` where no pixel counts.
@@ -231,21 +247,29 @@ type Metric<P> = fn(&Picture<P>, &Picture<P>, Option<&Mask>) -> Result<Option<f6
 
 fn measured(
     py: Python<'_>,
-    pair: Pair,
-    mask: Option<&Bound<'_, PyAny>>,
+    (pair, mask): (Pair, Option<Mask>),
     of_colours: Metric<SrgbRgb>,
     of_numbers: Metric<f32>,
 ) -> PyResult<Option<f64>> {
-    let mask = mask.map(mask_of).transpose()?;
     let work = move || match &pair {
         Pair::Colours(a, b) => of_colours(a, b, mask.as_ref()),
         Pair::Numbers(a, b) => of_numbers(a, b, mask.as_ref()),
     };
-    run_long(py, &Listener::none(), move |_| work())?.map_err(failed)
+    run_long(py, &Listener::none(), move |_| work())?.map_err(not_measured)
 }
 
-/// LPIPS 0.1 with AlexNet, of sRGB-encoded arrays of shape (height, width, 3). Where mask is given, the mean is over
-/// its pixels; None where there are none. Fails where the network's weights were not fetched.
+/// Pictures that are too small for a metric are the caller's fault; other sizes were checked before.
+fn not_measured(error: impl Into<anyhow::Error>) -> PyErr {
+    let error = error.into();
+    match error.downcast_ref::<MetricError>() {
+        Some(MetricError::TooSmall { .. }) => wrong_shape(format!("{error}; compare larger ones")),
+        _ => failed(error),
+    }
+}
+
+/// LPIPS 0.1 with AlexNet, of sRGB-encoded arrays of shape (height, width, 3), RGB (not BGR as OpenCV reads it). Where
+/// mask is given, the mean is over its pixels; None where there are none. Fails where the network's weights were not
+/// fetched.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
 pub fn lpips(
@@ -254,10 +278,10 @@ pub fn lpips(
     reference: &Bound<'_, PyAny>,
     mask: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Option<f64>> {
-    let Pair::Colours(a, b) = Pair::new(prediction, reference)? else {
-        return Err(PyValueError::new_err("expected arrays of the shape (height, width, 3), found (height, width)"));
+    let (Pair::Colours(a, b), mask) = Pair::with_mask(prediction, reference, mask)? else {
+        let found = "expected arrays of the shape (height, width, 3), found (height, width)";
+        return Err(wrong_shape(format!("{found}; `numpy.stack(3 * [array], -1)` repeats a grey picture's channel")));
     };
-    let mask = mask.map(mask_of).transpose()?;
     let work = move || {
         let network = network()?;
         anyhow::Ok(match &mask {
@@ -265,7 +289,7 @@ pub fn lpips(
             None => Some(network.whole(&a, &b)?),
         })
     };
-    run_long(py, &Listener::none(), move |_| work())?.map_err(failed)
+    run_long(py, &Listener::none(), move |_| work())?.map_err(not_measured)
 }
 
 /// The network, which is loaded once.

@@ -91,7 +91,8 @@ impl Submission {
     }
 
     /// Writes maps of one instance. Each map is square, with a side of 64 to 4096 texels of its own choice: base_color
-    /// (side, side, 3), roughness and metallic (side, side), rows from the top.
+    /// (side, side, 3), RGB (not BGR as OpenCV reads it), roughness and metallic (side, side), rows from the top. Other
+    /// shapes raise `mateval.WrongShape`, which is a ValueError.
     ///
     /// The dtype decides the encoding. uint8 and uint16 are stored as they are, as PNG: base_color is sRGB, roughness
     /// and metallic are linear. float16, float32 and float64 are linear, and stored as EXR: base_color from -1 to 16,

@@ -1,6 +1,6 @@
 //! A view: what methods may see of it, its ground truth, and its camera, for many points at once.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -9,15 +9,13 @@ use mateval_dataset::{camera, dataset};
 use mateval_eval::EvalError;
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use numpy::ndarray::{ArrayD, Axis, IxDyn};
-use numpy::{
-    AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _,
-};
+use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods as _};
 use pyo3::exceptions::{PyFileNotFoundError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{plane, read_picture, rows, triples};
+use crate::arrays::{numbers, plane, read_picture, rows, triples};
 use crate::instance::SharedScene;
-use crate::long_work::{failed, shown_in_notebook, withheld};
+use crate::long_work::{failed, shown_in_notebook, withheld, wrong_shape};
 
 /// A view of a scene. Its pictures are read from their files at each access.
 #[pyclass(frozen, module = "mateval")]
@@ -87,7 +85,8 @@ impl View {
         Camera(self.file().camera)
     }
 
-    /// The photo, linear radiance in Rec. 709 before exposure: (height, width, 3), float32. Only of the input view.
+    /// The photo, linear radiance in Rec. 709 before exposure: (height, width, 3), float32, RGB. Only of the
+    /// input view.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.check_input("rgb")?;
@@ -95,7 +94,7 @@ impl View {
         triples(py, picture, |LinearRgb(rgb)| rgb)
     }
 
-    /// The photo after exposure, clipped, sRGB: (height, width, 3), uint8. Only of the input view.
+    /// The photo after exposure, clipped, sRGB: (height, width, 3), uint8, RGB. Only of the input view.
     #[getter]
     fn preview<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         self.check_input("preview")?;
@@ -109,8 +108,8 @@ impl View {
         plane(py, read_picture(py, self.path("depth.exr"), &self.file().camera, exr_io::read_scalar)?)
     }
 
-    /// Shading normals in world space, of unit length, turned to the camera's side; 0 where nothing is hit: (height,
-    /// width, 3), float32.
+    /// Shading normals in world space, of unit length, on the camera's side of their triangle; those that are
+    /// interpolated near silhouettes may point away from the camera. 0 where nothing is hit: (height, width, 3), float32.
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let picture = read_picture(py, self.path("normal.exr"), &self.file().camera, exr_io::read_normal)?;
@@ -162,25 +161,30 @@ impl View {
     #[getter]
     fn truth(&self) -> PyResult<Truth> {
         self.source.file().check_materials_known().map_err(failed)?;
-        let folder = self.source.folder().truth_view(&self.file().id);
-        if folder.is_dir() {
-            return Ok(Truth { source: Arc::clone(&self.source), at: self.at });
-        }
-        let shown = folder.display();
-        let root = &self.source.dataset.root;
-        if !root.is_dir() {
-            return Err(PyFileNotFoundError::new_err(format!(
-                "'{}' does not exist: the dataset was moved since it was opened; open it again at its new place",
-                root.display()
-            )));
-        }
-        Err(withheld(format!("'{shown}' does not exist: the ground truth of this dataset is withheld")))
+        check_truth_held(&self.source, &self.source.folder().truth_view(&self.file().id))?;
+        Ok(Truth { source: Arc::clone(&self.source), at: self.at })
     }
 
     fn __repr__(&self) -> String {
         let k = &self.file().camera.intrinsics;
         format!("<mateval.View '{}' of scene '{}', {}x{}>", self.file().id, self.source.file().id, k.width, k.height)
     }
+}
+
+/// Fails where this folder of the scene's ground truth does not exist.
+pub fn check_truth_held(source: &SharedScene, folder: &Path) -> PyResult<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let root = &source.dataset.root;
+    if !root.is_dir() {
+        return Err(PyFileNotFoundError::new_err(format!(
+            "'{}' does not exist: the dataset was moved since it was opened; open it again at its new place",
+            root.display()
+        )));
+    }
+    let shown = folder.display();
+    Err(withheld(format!("'{shown}' does not exist: the ground truth of this dataset is withheld")))
 }
 
 /// The ground truth of a view. Its pictures are read from their files at each access. They hold values for pixels that
@@ -212,13 +216,13 @@ impl Truth {
 
 #[pymethods]
 impl Truth {
-    /// base_color, linear Rec. 709: (height, width, 3), float32.
+    /// base_color, linear Rec. 709: (height, width, 3), float32, RGB.
     #[getter]
     fn albedo<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.colours(py, self.path("albedo.exr"))
     }
 
-    /// base_color * (1 - metallic), linear Rec. 709: (height, width, 3), float32.
+    /// base_color * (1 - metallic), linear Rec. 709: (height, width, 3), float32, RGB.
     #[getter]
     fn diffuse_albedo<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.colours(py, self.path("diffuse_albedo.exr"))
@@ -242,8 +246,8 @@ impl Truth {
         plane(py, read_picture(py, self.path("specular_region.png"), &self.view().camera, png_io::read_mask)?)
     }
 
-    /// The picture of the photo's renderer, linear radiance in Rec. 709 before exposure: (height, width, 3), float32.
-    /// Raises `mateval.Error` where the scene is not rendered.
+    /// The picture of the photo's renderer, linear radiance in Rec. 709 before exposure: (height, width, 3), float32,
+    /// RGB. Raises `mateval.Error` where the scene is not rendered.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let dataset = &self.source.dataset;
@@ -300,11 +304,14 @@ impl Camera {
     fn project<'py>(
         &self,
         py: Python<'py>,
-        xyz: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
+        xyz: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let xyz = numbers("xyz", xyz)?;
         let points = xyz.as_array();
         let Some((3, outer)) = points.shape().split_last().map(|(last, outer)| (*last, outer.to_vec())) else {
-            return Err(PyValueError::new_err(format!("xyz: expected the shape (..., 3), found {:?}", points.shape())));
+            let found = points.shape();
+            let advice = "pass x, y and z in the last axis";
+            return Err(wrong_shape(format!("xyz: expected the shape (..., 3), found {found:?}; {advice}")));
         };
         let projection = self.0.projection();
         let lanes = points.lanes(Axis(outer.len()));
@@ -320,16 +327,14 @@ impl Camera {
     /// The world points, (height, width, 3) in metres, at the centres of the pixels of a depth picture of shape
     /// (height, width), in metres along the camera's axis; NaN where the depth is not above 0, as where nothing was
     /// hit.
-    fn unproject<'py>(
-        &self,
-        py: Python<'py>,
-        depth: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
-    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    fn unproject<'py>(&self, py: Python<'py>, depth: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let depth = numbers("depth", depth)?;
         let depths = depth.as_array();
         let (width, height) = (self.0.intrinsics.width as usize, self.0.intrinsics.height as usize);
         if depths.shape() != [height, width] {
             let expected = format!("the shape {:?} of the camera's picture", [height, width]);
-            return Err(PyValueError::new_err(format!("depth: expected {expected}, found {:?}", depths.shape())));
+            let advice = "pass the depth of the whole view, `View.depth` or one of its size";
+            return Err(wrong_shape(format!("depth: expected {expected}, found {:?}; {advice}", depths.shape())));
         }
         let matrix = self.0.matrix();
         let points: Vec<f64> = depths
@@ -346,10 +351,27 @@ impl Camera {
         PyArray1::from_vec(py, points).reshape([height, width, 3])
     }
 
+    /// The numbers of a pickled camera.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, CameraNumbers)> {
+        let rebuild = py.import("mateval._core")?.getattr("rebuilt_camera")?;
+        let k = &self.0.intrinsics;
+        Ok((rebuild, ((k.width, k.height), [k.fx, k.fy, k.cx, k.cy], self.0.world_from_camera)))
+    }
+
     fn __repr__(&self) -> String {
         let k = &self.0.intrinsics;
         format!("<mateval.Camera {}x{}, fx {:.2}, fy {:.2}>", k.width, k.height, k.fx, k.fy)
     }
+}
+
+/// Width and height; focal lengths and principal point, as fx, fy, cx, cy; and `world_from_camera`.
+type CameraNumbers = ((u32, u32), [f64; 4], [[f64; 4]; 4]);
+
+/// The copy of a pickled camera.
+#[pyfunction]
+pub fn rebuilt_camera(size: (u32, u32), intrinsics: [f64; 4], world_from_camera: [[f64; 4]; 4]) -> Camera {
+    let ((width, height), [fx, fy, cx, cy]) = (size, intrinsics);
+    Camera(camera::Camera { world_from_camera, intrinsics: camera::Intrinsics { width, height, fx, fy, cx, cy } })
 }
 
 fn shaped<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {

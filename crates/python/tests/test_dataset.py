@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mateval
-import mateval.torch
+from mateval import display
 
 HEIGHT, WIDTH = 72, 96
 
@@ -44,7 +44,7 @@ def test_absent_scenes_are_not_in_the_mapping(root, tmp_path):
 def test_a_scene_is_its_file(root, scene):
     file = json.loads((root / "scenes/room/scene.json").read_text())
     assert (scene.id, scene.house, scene.exposure) == ("room", "sample", file["exposure"])
-    assert scene.photo is None
+    assert scene.photo is None and not scene.redressed
     assert list(scene.instances) == [instance["id"] for instance in file["instances"]]
     assert [part.index for part in scene.parts.values()] == [part["index"] for part in file["parts"]]
     assert list(scene.views) == [view["id"] for view in file["views"]]
@@ -169,33 +169,10 @@ def test_a_missing_dataset_has_the_commands_text(tmp_path, command, nn):
 
 
 def test_wrong_camera_inputs_say_what_was_expected(scene):
-    with pytest.raises(ValueError, match=r"depth: expected the shape \[72, 96\] .* found \[2, 2\]"):
+    with pytest.raises(mateval.WrongShape, match=r"depth: expected the shape \[72, 96\] .* found \[2, 2\]; pass the depth"):
         scene.input.camera.unproject(np.zeros((2, 2)))
-    with pytest.raises(ValueError, match=r"xyz: expected the shape \(\.\.\., 3\), found \[2\]"):
+    with pytest.raises(mateval.WrongShape, match=r"xyz: expected the shape \(\.\.\., 3\), found \[2\]"):
         scene.input.camera.project(np.zeros(2))
-
-
-def test_views_are_a_map_style_dataset(dataset, scene):
-    views = mateval.torch.Views(dataset)
-    assert len(views) == 1
-    item = views[0]
-    assert (item["scene"], item["view"]) == ("room", "input") and set(item) == {"scene", "view", "rgb", "depth", "valid"}
-    assert np.array_equal(item["rgb"], scene.input.rgb)
-    all_views = mateval.torch.Views(dataset, fields=["truth.albedo"], views=scene.views)
-    assert len(all_views) == 5 and all_views[4]["truth.albedo"].shape == (HEIGHT, WIDTH, 3)
-    assert len(pickle.loads(pickle.dumps(views))) == 1
-    with pytest.raises(IndexError):
-        views[1]
-    cameras = mateval.torch.Views(dataset, fields=["camera.K", "camera.world_from_camera"])
-    assert cameras[0]["camera.K"].shape == (3, 3) and cameras[0]["camera.world_from_camera"].shape == (4, 4)
-    # The camera itself is no array.
-    for other in ("colour", "normals", "camera", "truth"):
-        with pytest.raises(ValueError, match=f"fields: expected arrays of a view .*normal.*, found '{other}'"):
-            mateval.torch.Views(dataset, fields=[other])
-    with pytest.raises(TypeError, match=r"fields: expected a list such as \['rgb'\]"):
-        mateval.torch.Views(dataset, fields="rgb")
-    with pytest.raises(mateval.UnknownId, match="has no view 'left'"):
-        mateval.torch.Views(dataset, views=["left"])
 
 
 def test_scenes_are_found_by_their_place(eight_scenes):
@@ -212,15 +189,29 @@ def test_scenes_and_views_can_be_pickled(scene):
     assert np.array_equal(view.depth, scene.views["up_left"].depth)
 
 
-def test_scenes_for_loaders_hold_all_their_views(root, scene):
-    item = mateval.torch.Scenes(root, fields=["rgb", "depth", "truth.albedo"])[0]
-    assert item["scene"] == "room" and item["view"] == list(scene.views)
-    assert item["rgb"].shape == (HEIGHT, WIDTH, 3)
-    assert item["depth"].shape == (5, HEIGHT, WIDTH) and item["truth.albedo"].shape == (5, HEIGHT, WIDTH, 3)
-    assert np.array_equal(item["depth"][2], list(scene.views.values())[2].depth)
-    assert mateval.torch.Scenes(root, fields=["valid"], views=["input"])[0]["valid"].shape == (1, HEIGHT, WIDTH)
-    with pytest.raises(mateval.UnknownId, match="no view 'down'"):
-        mateval.torch.Scenes(root, views=["down"])
+def test_cameras_and_instances_can_be_pickled(scene):
+    camera = scene.views["up_left"].camera
+    copy = pickle.loads(pickle.dumps(camera))
+    assert copy.size == camera.size and np.array_equal(copy.K, camera.K)
+    assert np.array_equal(copy.world_from_camera, camera.world_from_camera)
+    # The twin: another view's camera.
+    assert not np.array_equal(copy.world_from_camera, scene.input.camera.world_from_camera)
+    copies = pickle.loads(pickle.dumps(dict(scene.instances)))
+    assert list(copies) == list(scene.instances)
+    for id, copy in copies.items():
+        instance = scene.instances[id]
+        assert (copy.id, copy.index, copy.role) == (instance.id, instance.index, instance.role)
+    assert np.array_equal(copy.mesh.vertices, instance.mesh.vertices)
+
+
+def test_a_copy_opens_a_dataset_that_changed_anew(root, tmp_path):
+    copy = tmp_path / "dataset"
+    shutil.copytree(root, copy)
+    pickled = pickle.dumps(mateval.open(copy)["room"].input)
+    assert pickle.loads(pickled).id == "input"
+    (copy / "dataset.json").write_text("{")
+    with pytest.raises(mateval.Error, match="dataset.json"):
+        pickle.loads(pickled)
 
 
 def test_notebooks_show_scenes_and_views(scene, withheld):
@@ -228,3 +219,30 @@ def test_notebooks_show_scenes_and_views(scene, withheld):
     assert "the true albedo" in scene.views["up_left"]._repr_html_()
     without = mateval.open(withheld)["room"].views["up_left"]._repr_html_()
     assert "withheld" in without and "<img" not in without
+
+
+def test_notebooks_show_datasets(root, eight_scenes, withheld, tmp_path, monkeypatch):
+    table = mateval.open(root)._repr_html_()
+    assert "<td>room</td><td>sample</td><td>5</td><td>96x72</td><td></td>" in table and "not shown" not in table
+    assert "<td>truth withheld</td>" in mateval.open(withheld)._repr_html_()
+    eight = mateval.open(eight_scenes)
+    assert eight._repr_html_().count("<tr>") == 1 + 8 and "8 scenes" in eight._repr_html_()
+    monkeypatch.setattr(display, "MOST_SCENES", 3)
+    assert eight._repr_html_().count("<tr>") == 1 + 3 and "5 of the scenes" in eight._repr_html_()
+    shutil.copytree(root, tmp_path / "part", ignore=lambda folder, names: names if folder == str(root / "scenes") else [])
+    assert "1 that was not downloaded" in mateval.open(tmp_path / "part")._repr_html_()
+
+
+def test_lightings_need_the_truth(withheld):
+    with pytest.raises(mateval.Withheld, match="ground_truth' does not exist"):
+        mateval.open(withheld)["room"].lightings
+
+
+def test_pictures_are_bytes_floats_or_booleans(scene):
+    view = scene.input
+    shown = mateval.display.Pictures({"photo": view.rgb, "depth": view.depth / view.depth.max(), "valid": view.valid})
+    assert shown._repr_html_().count("<img") == 3
+    with pytest.raises(ValueError, match="ids: expected uint8, floats or booleans, found uint16; scale it"):
+        mateval.display.Pictures({"ids": view.instance})._repr_html_()
+    with pytest.raises(TypeError, match="pictures: expected a dictionary by captions, found list"):
+        mateval.display.Pictures([view.rgb])

@@ -227,7 +227,7 @@ def test_programs_are_typed(tmp_path):
 def test_the_import_is_quick_and_lazy():
     program = textwrap.dedent("""
         import sys, time
-        # Of the processor: the clock's depends on what else runs.
+        # Processor time: elapsed time depends on what else runs.
         start = time.process_time()
         import mateval
         print(time.process_time() - start)

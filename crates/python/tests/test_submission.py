@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import pickle
 import subprocess
 import sys
 import textwrap
@@ -42,6 +43,16 @@ def test_lift_equals_the_baseline_byte_for_byte(dataset, scene, nn, tmp_path):
     assert any(found.seen.any() for found in maps.values())
     for found in maps.values():
         assert found.seen.shape == found.roughness.shape and found.seen.dtype == np.bool_
+
+
+def test_maps_can_be_pickled(scene):
+    for given in ({"base_color": scene.input.preview}, {"roughness": scene.input.truth.roughness}):
+        maps = next(iter(mateval.lift(scene, **given).values()))
+        copy = pickle.loads(pickle.dumps(maps))
+        for name in ("base_color", "roughness", "metallic", "seen"):
+            before, after = getattr(maps, name), getattr(copy, name)
+            assert (before is None) == (after is None) == (name not in (*given, "seen"))
+            assert before is None or np.array_equal(before, after)
 
 
 def test_lift_equals_the_baseline_with_other_options(root, dataset, scene, command, tmp_path):
@@ -220,7 +231,7 @@ def test_wrong_maps_are_refused(dataset, scene, tmp_path, error, match, argument
         (ValueError, "neighbours: expected 1 to 255, found 0", {"base_color": FLAT, "neighbours": 0}),
         (ValueError, "normal_weight: expected 0 to 100 m, found -1", {"base_color": FLAT, "normal_weight": -1}),
         (ValueError, "atlas_size: expected 64 to 4096 texels, found 5", {"base_color": FLAT, "atlas_size": 5}),
-        (mateval.Error, "has 64x64 pixels, the input view 96x72; expected the same proportions.*scale it back", {"base_color": FLAT}),
+        (mateval.WrongShape, "has 64x64 pixels, the input view 96x72; expected the same proportions.*scale it back", {"base_color": FLAT}),
     ],
 )
 def test_wrong_estimates_are_refused(scene, error, match, arguments):
@@ -298,9 +309,17 @@ def test_metrics_are_the_scorers(scene):
     assert mateval.metrics.ssim(a, a) == pytest.approx(1)
     assert 0 < mateval.metrics.ssim(a, b, mask) < 0.5
     assert mateval.metrics.ssim(np.zeros((11, 11), np.uint8), np.zeros((11, 11), np.uint8)) == 1
-    with pytest.raises(mateval.Error, match="reference has 50x39 pixels; expected 50x40"):
-        mateval.metrics.psnr(a, b[1:])
-    with pytest.raises(mateval.Error, match="at least 11x11 pixels; found 5x5"):
+    for wrong, text in (
+        ((a, b[1:]), r"reference: expected the height and width of prediction, \[40, 50\], found \[39, 50\]; scale"),
+        ((a, b[..., 0]), r"reference: expected the shape \(height, width, 3\) of the prediction, found \[40, 50\]"),
+        ((a[..., 0], b), r"reference: expected the shape \(height, width\) of the prediction, found \[40, 50, 3\]"),
+        ((a, b, mask[:, 1:]), r"mask: expected the height and width of prediction, \[40, 50\], found \[40, 49\]"),
+        ((a, b, mask[0]), r"mask: expected the shape \(height, width\), found \[50\]"),
+    ):
+        with pytest.raises(mateval.WrongShape, match=text) as raised:
+            mateval.metrics.psnr(*wrong)
+        assert isinstance(raised.value, ValueError) and isinstance(raised.value, mateval.Error)
+    with pytest.raises(mateval.WrongShape, match="at least 11x11 pixels; found 5x5; compare larger ones"):
         mateval.metrics.ssim(a[:5, :5], b[:5, :5])
     with pytest.raises(TypeError, match="reference: expected floats like the prediction, found integers"):
         mateval.metrics.psnr(a, (b * 255).astype(np.uint8))
@@ -406,8 +425,9 @@ def scores(root, nn, command, tmp_path_factory):
 def test_results_are_saved_loaded_and_compared(root, scores, command, tmp_path, monkeypatch):
     (grey, nn), _ = scores
     nn.save(tmp_path / "nn.json")
-    with pytest.raises(FileExistsError):
+    with pytest.raises(FileExistsError, match="nn.json' already exists; .* force=True"):
         nn.save(tmp_path / "nn.json")
+    nn.save(tmp_path / "nn.json", force=True)
     assert dict(mateval.Result.load(tmp_path / "nn.json")) == dict(nn)
     (tmp_path / "nn.json").write_text(nn.json.replace('"albedo.novel.psnr": ', '"albedo.novel.psnr": 1', 1))
     with pytest.raises(mateval.Error):
@@ -447,12 +467,20 @@ def test_a_scene_is_rendered_with_any_maps(scene, nn, scores):
     black = scene.render({next(iter(maps)): {"base_color": np.zeros((64, 64, 3), np.uint8)}}, samples=1)
     assert not np.array_equal(black["input"], ours["input"])
     assert not np.array_equal(scene.render(nn, light="warm_cool", samples=1)["input"], ours["input"])
-    with pytest.raises(ValueError, match="light: expected 'true', 'warm_cool'"):
+    with pytest.raises(ValueError, match="light: expected a name of `Scene.lightings`, such as 'true'"):
         scene.render(nn, light="sun")
     with pytest.raises(ValueError, match="expected base_color, roughness, metallic, found 'albedo'"):
         scene.render({next(iter(maps)): {"albedo": np.zeros((64, 64, 3), np.uint8)}})
-    with pytest.raises(ValueError, match="light: scene 'room' has no lighting 'alone_9'"):
+    with pytest.raises(TypeError, match="maps: .*: expected Maps or a dictionary of base_color, .*, found ndarray"):
+        scene.render({next(iter(maps)): np.zeros((64, 64, 3), np.uint8)})
+    with pytest.raises(ValueError, match="light: scene 'room' has no lighting 'alone_9'; `Scene.lightings` lists"):
         scene.render(nn, light="alone_9", samples=1)
+    # The scorer's own lightings.
+    (_, result), _ = scores
+    scored = {record["lighting"] for record in result.to_records() if record["picture"] == "rgb_relit"}
+    assert scene.lightings[:2] == ["true", "warm_cool"] and set(scene.lightings[1:]) == scored
+    for light in scene.lightings:
+        assert list(scene.render(nn, light=light, samples=1)) == list(scene.views)
 
 
 def test_exceptions_speak_python(dataset, nn):

@@ -41,6 +41,14 @@ static PHOTOS: LazyLock<Dataset> = LazyLock::new(|| {
     Dataset::open(&out).unwrap()
 });
 
+static HOUSES: LazyLock<Dataset> = LazyLock::new(|| {
+    let source = kept_folder("houses").join("source");
+    mateval_sample::write_houses(&source, 2, 0).unwrap();
+    let out = build_source(&source, "views = []\n");
+    render(&out, &RenderOptions { samples: Some(16), ..RenderOptions::default() }, &|_| ()).unwrap();
+    Dataset::open(&out).unwrap()
+});
+
 static TWINS: LazyLock<Dataset> = LazyLock::new(|| {
     let root = kept_folder("twins").join("dataset");
     copy_folder(&dataset().root, &root);
@@ -53,6 +61,12 @@ static TWINS: LazyLock<Dataset> = LazyLock::new(|| {
 /// The dataset with three twins of each scene, listed among the scenes; tests must not write to it.
 pub fn twins() -> &'static Dataset {
     &TWINS
+}
+
+/// Two rooms of two other houses, which have input views alone, with photos of 16 samples a half. Tests must not write
+/// to it.
+pub fn houses() -> &'static Dataset {
+    &HOUSES
 }
 
 /// Renders the scorer's references of a dataset.
@@ -79,10 +93,14 @@ pub fn built_with_wide_views() -> PathBuf {
 
 /// Builds the dataset in a kept folder of this name, with another line in the recipe.
 fn build_in(name: &str, line: &str) -> PathBuf {
-    let folder = kept_folder(name);
-    let (source, out) = (folder.join("source"), folder.join("dataset"));
+    let source = kept_folder(name).join("source");
     mateval_sample::write(&source).unwrap();
-    let recipe = source.join("recipe.toml");
+    build_source(&source, line)
+}
+
+/// Builds the dataset of a source's recipe, with another line in it, beside the source.
+fn build_source(source: &Path, line: &str) -> PathBuf {
+    let (recipe, out) = (source.join("recipe.toml"), source.with_file_name("dataset"));
     let whole = std::fs::read_to_string(&recipe).unwrap();
     assert!(whole.contains(HEAD[0]), "{whole}");
     std::fs::write(&recipe, whole.replace(HEAD[0], &format!("{}{line}", HEAD[1]))).unwrap();

@@ -332,7 +332,7 @@ fn sample_light<const K: usize>(
     // Sample a light and evaluate the BSDF towards it.
     let [a, b, c, _] = path.sampler.set(1 + 2 * scatterings);
     let light = world.emitters().sample(place.position, [a, b, c], |place| world.opacity_at(place))?;
-    let part = if light.on_stage { BsdfPart::Stage } else { BsdfPart::All };
+    let part = if light.is_matt { BsdfPart::Stage } else { BsdfPart::All };
     let (values, density) = bsdf.evaluate(light.direction, part);
     if values == [Vec3::ZERO; K] {
         return None;
@@ -424,8 +424,10 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Contributions<'_, K
     /// Adds the stage lights that the ray passes before it meets a surface `end` metres away.
     fn add_stage(&mut self, path: &Path<K>, ray: &Ray, end: f32) {
         let Some(Scattered { from, .. }) = path.scattered else { return };
-        for emitted in self.world.emitters().stage_along(&Ray::new(ray.origin(), ray.direction(), end), from) {
-            self.add_met(path, path.stage_throughputs, &emitted);
+        let ray = Ray::new(ray.origin(), ray.direction(), end);
+        for (emitted, is_flash) in self.world.emitters().stage_along(&ray, from) {
+            let throughputs = if is_flash { path.throughputs } else { path.stage_throughputs };
+            self.add_met(path, throughputs, &emitted);
         }
     }
 

@@ -10,6 +10,7 @@ use mateval_image::exr_io::{Precision, write_grey, write_linear};
 use mateval_image::png_io::{write_grey_bytes, write_srgb};
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_pages::{figure, plain};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::room::FittedLight;
@@ -18,9 +19,11 @@ use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
 use crate::submission::check_new_place;
 
-/// The fitted lights of a scene, `lights.json`.
-#[derive(Serialize)]
-struct LightsFile<'a> {
+/// `lights.json` of a de-lit photo: the lights that were fitted to it.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedLightsFile<'a> {
+    /// Always `mateval-fitted-lights/2`.
     format: &'static str,
     /// Which lights were given the chance to shine.
     candidates: CandidateLights,
@@ -47,8 +50,8 @@ pub fn write(
         let folder = work.path().join(scene.id.as_str());
         make_folder(&folder)?;
         write_pictures(&folder, &delit, scene.exposure as f32)?;
-        let lights =
-            LightsFile { format: "mateval-fitted-lights/2", candidates: options.lights, lights: &delit.lights };
+        let format = "mateval-fitted-lights/2";
+        let lights = FittedLightsFile { format, candidates: options.lights, lights: &delit.lights };
         json::write(&folder.join("lights.json"), &lights)?;
         sections.push_str(&section(scene.id.as_str(), &delit));
     }

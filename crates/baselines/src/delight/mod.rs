@@ -23,7 +23,7 @@ use mateval_tracer::{PhotoCache, split_light};
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::geometry::SceneGeometry;
-pub use files::write;
+pub use files::{FittedLightsFile, write};
 use mirrors::find_mirrors;
 use room::PartRoom;
 pub use room::{CandidateLights, FittedLight, LightSource, PossibleLight};
@@ -126,7 +126,7 @@ fn run(room: &PartRoom, options: &DelightOptions, progress: Progress<'_>) -> Res
             })
         };
         let halves = [half(0)?, half(1)?];
-        let (photo, valid, parts) = (&room.photo, &room.valid, &room.parts);
+        let (photo, valid, parts) = (&room.photo, &room.fitted, &room.parts);
         let target = JointTarget { photo, valid, parts, light: &halves, shown: &room.shown };
         let fit = fit_jointly(&options.fit, &target);
         // The weights of a basis: the radiances, and 1 for what the photo lights.
@@ -424,7 +424,18 @@ mod tests {
         let lights = (0..lamps.len()).map(light).collect();
         let owners = (0..scene.surfaces.len()).collect();
         Planted {
-            room: PartRoom { world, shown: vec![None; 3], lights, camera, photo, valid, parts, normals, owners },
+            room: PartRoom {
+                world,
+                shown: vec![None; 3],
+                lights,
+                camera,
+                photo,
+                fitted: valid.clone(),
+                valid,
+                parts,
+                normals,
+                owners,
+            },
             truth,
             radiances,
         }

@@ -11,11 +11,12 @@ use mateval_dataset::{Camera, DatasetError, glb, word_enum};
 use mateval_image::exr_io::read_linear;
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use mateval_light::candidates::{Candidate, add_candidates, sky_extent_deg};
-use mateval_light::light_stage::StageRules;
-use mateval_light::light_stage::{NamedLight, scene_lights};
+use mateval_light::light_stage::{FLASH, NamedLight, StageRules, flash_light, scene_lights};
+use mateval_light::photo_pixels::PhotoRules;
 use mateval_tracer::aov::PixelHit;
 use mateval_tracer::{World, aov};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::BaselineError;
@@ -45,6 +46,9 @@ pub(super) struct PartRoom {
     pub(super) photo: Picture<LinearRgb>,
     /// Valid pixels of a known part.
     pub(super) valid: Mask,
+    /// The pixels of `valid` that light is fitted to. Clipped pixels of a photo from elsewhere are left out: they state
+    /// only a lower bound of the radiance.
+    pub(super) fitted: Mask,
     /// The surface of each pixel's part, or [`NO_PART`].
     pub(super) parts: Picture<u16>,
     /// World-space normals, towards the camera.
@@ -59,10 +63,11 @@ impl PartRoom {
         let scene = geometry.scene;
         let photo = photo(geometry)?;
         let PartSurfaces { mut room, owners, of_part } = PartSurfaces::read(geometry)?;
-        // Add what may glow, and a stage, which is made for the world of instances.
+        // Add what may glow, and a stage, which is made for the world of instances. A flash may be the only light.
+        let has_room_light = scene.flash.as_ref().is_none_or(|flash| !flash.only_light);
         let candidates = match lights {
-            CandidateLights::Room => add_candidates(&mut room, scene, &owners, &glowing(geometry)),
-            CandidateLights::Stage => Vec::new(),
+            CandidateLights::Room if has_room_light => add_candidates(&mut room, scene, &owners, &glowing(geometry)),
+            _ => Vec::new(),
         };
         let stage = scene_lights(&StageRules::default(), scene, &geometry.world);
         let names = room.lights.iter().map(|light| light.name.clone());
@@ -71,8 +76,14 @@ impl PartRoom {
             .map(|(name, candidate)| PossibleLight::of_candidate(name, *candidate, &scene.instances))
             .collect();
         lights.extend(stage.iter().map(PossibleLight::of_stage));
+        let mut stage: Vec<_> = stage.into_iter().map(|light| light.light).collect();
+        let flash = scene.flash.as_ref().filter(|flash| flash.views.contains(&geometry.view.id));
+        if let Some(flash) = flash {
+            let source = LightSource::Flash { offset_m: flash.offset_m, is_known: flash.intensity.is_some() };
+            lights.push(PossibleLight { name: FLASH.to_owned(), source });
+            stage.push(flash_light(flash, &geometry.view.camera));
+        }
         make_names_distinct(&mut lights);
-        let stage: Vec<_> = stage.into_iter().map(|light| light.light).collect();
         let world = World::new(Arc::new(room))?.with_stage(&stage)?;
         // Find what each pixel shows.
         let parts = geometry.part_picture(None)?.map(|part| of_part.get(&part).copied().unwrap_or(NO_PART));
@@ -86,8 +97,16 @@ impl PartRoom {
             let owner = hit.as_ref().map(|hit| owners[hit.surface.0]);
             candidates.iter().position(|candidate| shows(geometry, *candidate, owner, [x, y]))
         });
-        let shown = (0..lights.len()).map(|light| mean_of_pixels(&photo, &emission, light)).collect();
-        Ok(Self { world, lights, shown, camera, photo, valid, parts, normals, owners })
+        let mut shown: Vec<_> = (0..lights.len()).map(|light| mean_of_pixels(&photo, &emission, light)).collect();
+        if let (Some(flash), Some(shown)) = (flash, shown.last_mut()) {
+            *shown = flash.intensity;
+        }
+        let limit = PhotoRules::default().clipped_from / scene.clipping_exposure(&geometry.view.id);
+        let is_clipped = |LinearRgb(rgb): LinearRgb| rgb.iter().any(|v| f64::from(*v) >= limit);
+        let fitted = Mask::from_fn(width, height, |x, y| {
+            valid.get(x, y) && (scene.photo.is_none() || !is_clipped(photo.get(x, y)))
+        });
+        Ok(Self { world, lights, shown, camera, photo, valid, fitted, parts, normals, owners })
     }
 }
 
@@ -202,29 +221,41 @@ fn grey() -> Material {
 }
 
 /// A light that may shine, of radiance 1.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PossibleLight {
     /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage; unique in
     /// its scene.
     pub name: String,
+    /// What has the radiance.
     pub source: LightSource,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightSource {
     /// Both sides of all surfaces of an instance.
-    Instance { instance: String },
+    Instance {
+        /// The instance's id.
+        instance: String,
+    },
     /// Both sides of all ceilings.
     Ceilings {},
     /// The world around, alike in all directions.
     World {},
-    /// A part of the world around.
+    /// The world around, in a range of directions.
     Sky {
         /// From and to: 0 is -Z, 90 is +X.
         azimuth_deg: [f32; 2],
         /// From and to: 90 is +Y, straight up.
         elevation_deg: [f32; 2],
+    },
+    /// The flash at the camera, which shines in all directions alike and blocks no light. Its radiance is its radiant
+    /// intensity, in the unit of radiance times square metres.
+    Flash {
+        /// From the camera: to the right, up, and back from what it looks at.
+        offset_m: [f64; 3],
+        /// Whether the scene states its intensity, which is then kept but for a small tolerance.
+        is_known: bool,
     },
     /// The front of a quad of the light stage. It casts no shadow, and surfaces reflect it diffusely alone.
     Quad {
@@ -234,7 +265,8 @@ pub enum LightSource {
 }
 
 /// A light with the radiance that was fitted to it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct FittedLight {
     #[serde(flatten)]
     pub light: PossibleLight,

@@ -13,7 +13,7 @@ use mateval_eval::result::ResultFile;
 use mateval_report::explain::{self, ExplainPlan};
 use mateval_report::leaderboard::entries::ResultsFolder;
 use mateval_report::leaderboard::marks::{TrustedKeys, Verified};
-use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries, marks};
+use mateval_report::leaderboard::{self, Hub, LeaderboardPlan, Submissions, entries, marks};
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_report::votes::{plain, preferences};
@@ -300,12 +300,39 @@ pub struct LeaderboardArgs {
     /// JSON file of errors that were found after publication.
     #[arg(long)]
     errata: Option<PathBuf>,
-    /// Markdown file for the page "About": contact, licence of the dataset, the paper, how to submit.
+    /// Markdown file for the page "About": contact, licence of the dataset, the paper, the date of the board, how to
+    /// submit.
     #[arg(long, value_name = "FILE.md")]
     about: Option<PathBuf>,
+    /// The board's dataset on the Hugging Face Hub, as in `NAME/dataset`. Adds README.md, which makes the site a static
+    /// Space, and in downloads/eval_results a file for the folder .eval_results of each method's model.
+    #[arg(long, value_name = "NAME/DATASET", requires = "url", value_parser = hub_name)]
+    hub_dataset: Option<String>,
+    /// For --hub-dataset: the address where the site will be published.
+    #[arg(long, requires = "hub_dataset", value_parser = web_address)]
+    url: Option<String>,
     /// Replace a leaderboard that already exists.
     #[arg(long)]
     force: bool,
+}
+
+/// The name of a repository on the Hub.
+fn hub_name(text: &str) -> anyhow::Result<String> {
+    let is_name = |part: &str| {
+        part.starts_with(|c: char| c.is_ascii_alphanumeric())
+            && part.chars().all(|c| c.is_ascii_alphanumeric() || ['-', '_', '.'].contains(&c))
+    };
+    match text.split('/').collect::<Vec<_>>()[..] {
+        [owner, name] if is_name(owner) && is_name(name) => Ok(text.to_owned()),
+        _ => bail!("expected OWNER/NAME of a repository"),
+    }
+}
+
+fn web_address(text: &str) -> anyhow::Result<String> {
+    match text.starts_with("https://") || text.starts_with("http://") {
+        true => Ok(text.to_owned()),
+        false => bail!("expected an address that begins with https:// or http://"),
+    }
 }
 
 impl LeaderboardArgs {
@@ -368,10 +395,14 @@ impl LeaderboardArgs {
             }),
             votes: self.votes,
             original: original.as_deref(),
+            hub: self.hub_dataset.clone().zip(self.url.clone()).map(|(dataset, url)| Hub { dataset, url }),
             tool: TOOL.to_owned(),
         };
         with_progress(|progress| leaderboard::write(&plan, &self.out, self.force, progress))
             .context("cannot write the leaderboard")?;
+        if entries.about.is_none() {
+            say("note: the page 'About' states no contact, licence, paper or date; give them in about.md (--about)");
+        }
         print(&format!("{}\n", self.out.join("index.html").display()))?;
         Ok(Outcome::Good)
     }

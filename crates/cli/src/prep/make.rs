@@ -14,7 +14,7 @@ use mateval_prep::build::BuildOptions;
 use mateval_prep::build::finish::finish_again;
 use mateval_prep::build::upgrade::bring_up_to_date;
 use mateval_prep::perturb::{PerturbOptions, PerturbedScene, perturb};
-use mateval_prep::recipe::MOST_SAMPLES;
+use mateval_prep::recipe::{MOST_SAMPLES, Redress};
 use mateval_prep::render::{BlenderOptions, BlenderProgram, DeviceChoice, RenderOptions, Renderer, RendererKind};
 use mateval_prep::stats::findings::by_code;
 use mateval_prep::survey::rules::SelectionRules;
@@ -66,6 +66,10 @@ pub struct SurveyArgs {
     /// random bytes. It must lie outside of --source and --out.
     #[arg(long, value_name = "KEY")]
     redress: Option<PathBuf>,
+    /// With --redress: a private folder of tileable materials, in the layout of CC0 libraries, to draw from instead of
+    /// the built-in procedural ones. It must lie outside of --source and --out.
+    #[arg(long, value_name = "FOLDER", requires = "redress")]
+    redress_materials: Option<PathBuf>,
     /// Search this house only, and leave the survey of all to a later run without --house; may be given several times.
     /// It is a house's file relative to --source, or the file's name without .json. Several processes may search
     /// different houses of one survey at once.
@@ -113,7 +117,7 @@ impl SurveyArgs {
             camera_rules: self.camera_rules,
             only: self.only.clone(),
             goal: self.scenes.map(|scenes| SelectionGoal::of_paper(scenes as usize, self.scenes_per_house as usize)),
-            redress: self.redress.clone(),
+            redress: self.redress.clone().map(|key| Redress { key, materials: self.redress_materials.clone() }),
             out: self.out.clone(),
             force: self.force,
         })

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use mateval_dataset::dataset::SceneFile;
+use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::open::{Dataset, check_outside_datasets};
 use mateval_dataset::{Finding, SceneId, Severity, ViewId};
-use mateval_eval::metric::Better;
+use mateval_eval::metric::{Better, PictureKind};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result::key::ResultKey;
@@ -307,7 +308,7 @@ impl ExportArgs {
         }
         if without_picture > 0 {
             line.push_str(&format!(
-                "; {} without a picture, because theirs is withheld",
+                "; {} without a picture, because theirs is withheld or was not rendered",
                 counted(without_picture, "view")
             ));
         }
@@ -334,6 +335,9 @@ impl ExportArgs {
             check_floor(&ResultFile::read(path)?, &dataset, &dataset.file.scenes)?;
         }
         let protocol = protocol_of(&dataset.scenes)?;
+        let truth = self.competition.private.as_ref().unwrap_or(&self.dataset);
+        let has_measured = dataset.scenes.iter().any(|scene| SceneFolder::of(truth, &scene.id).has_measured());
+        let has_values = |key: &&ResultKey| key.picture.kind != PictureKind::Measured || has_measured;
         let column = |key: &ResultKey| {
             let style = &key.metric.row().style;
             Column {
@@ -348,7 +352,7 @@ impl ExportArgs {
             floors: self.competition.floors.clone(),
             out: self.out.clone(),
             image: self.competition.image.clone().unwrap_or_default(),
-            columns: protocol.headline.iter().map(column).collect(),
+            columns: protocol.headline.iter().filter(has_values).map(column).collect(),
             protocol: protocol.name,
             seconds_a_scene: self.competition.seconds_a_scene,
             limit: self.competition.limit.unwrap_or(600),

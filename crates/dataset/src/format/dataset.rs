@@ -223,10 +223,13 @@ pub struct SceneFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo: Option<Photo>,
     /// By view, the other photos of a captured room, with which renders are compared:
-    /// `ground_truth/views/<view>/photo.exr`. Each has an exposure of its own, which is not known.
-    /// Absent where there are none.
+    /// `ground_truth/views/<view>/photo.exr`. Each has an exposure of its own, which is known where `relative_exposure`
+    /// states it. Absent where there are none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub novel_photos: BTreeMap<ViewId, Photo>,
+    /// The flash beside the cameras of a captured room; absent where none was fired.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flash: Option<Flash>,
     /// What is public of the truth, where materials were replaced by others that were drawn with a secret key; absent
     /// where the truth has the source's materials.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -316,10 +319,58 @@ pub struct Photo {
     pub size: [u32; 2],
     /// How its values were read.
     pub encoding: PhotoEncoding,
+    /// The number at which floating-point numbers are clipped; absent where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white: Option<f64>,
+    /// The exposure of a photo of another view divided by that of the input photo; the written picture is the photo
+    /// divided by it. Absent where it is not known, and for the input photo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_exposure: Option<f64>,
     /// The lens that it was undistorted from: `lens` shows the direction (x, y) of the camera's picture at its place in
     /// the file. Absent where the photo was only reduced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<Lens>,
+}
+
+/// A flash that was fixed beside the camera while photos of a captured room were taken. It shines in all directions
+/// alike, so that its light falls off with the square of the distance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Flash {
+    /// Its place from each camera, in metres: to the right, up, and back from what the camera looks at.
+    pub offset_m: [f64; 3],
+    /// Its radiant intensity, linear Rec. 709, in the unit of the photos' radiance before exposure times square metres:
+    /// a white diffuse surface that faces it a metre away has this radiance divided by pi. Absent where it is not
+    /// known; it is then fitted with the other lights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intensity: Option<[f64; 3]>,
+    /// The views whose photos were taken with it.
+    pub views: Vec<ViewId>,
+    /// Whether it was the only light, so that no others are fitted.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub only_light: bool,
+}
+
+impl Flash {
+    /// The farthest that a flash may be from its camera, in metres.
+    pub const FARTHEST_M: f64 = 2.0;
+    /// Beyond these a flash lights nothing, or renders overflow.
+    const INTENSITIES: (f64, f64) = (1e-6, 1e6);
+
+    /// The key of the first value that is out of range, what was found and what was expected.
+    pub fn fault(&self) -> Option<(&'static str, String, String)> {
+        let distance_m = self.offset_m.iter().map(|v| v * v).sum::<f64>().sqrt();
+        // NaN is in no range.
+        if !(0.0..=Self::FARTHEST_M).contains(&distance_m) {
+            let expected = format!("a place of at most {} m from the camera", Self::FARTHEST_M);
+            return Some(("offset_m", format!("{:?}", self.offset_m), expected));
+        }
+        let (least, most) = Self::INTENSITIES;
+        let is_sound = |rgb: &[f64; 3]| rgb.iter().all(|v| *v == 0.0 || (least..=most).contains(v)) && *rgb != [0.0; 3];
+        let found = self.intensity.as_ref().filter(|rgb| !is_sound(rgb))?;
+        let expected = format!("numbers of {least} to {most}, or 0 of a channel without light");
+        Some(("intensity", format!("{found:?}"), expected))
+    }
 }
 
 /// How the values of a photo's file state radiance.
@@ -471,6 +522,15 @@ impl SceneFile {
     /// Whether its truth is meant to be a secret: it was redressed, or its source is private.
     pub fn is_secret(&self) -> bool {
         self.redressed.is_some() || self.source.private
+    }
+
+    /// The exposure at which every clipped channel of a view's photo is at least 1: the scene's, or a larger one if the
+    /// photo states a lower white. The scene's for a view without a photo.
+    pub fn clipping_exposure(&self, view: &ViewId) -> f64 {
+        let photo = if view.as_str() == ViewId::INPUT { self.photo.as_ref() } else { self.novel_photos.get(view) };
+        let Some(photo) = photo else { return self.exposure };
+        let of_file = photo.white.map_or(self.exposure, |white| self.exposure.max(1.0 / white));
+        of_file * photo.relative_exposure.unwrap_or(1.0)
     }
 
     pub fn view(&self, id: &str) -> Option<&View> {
@@ -678,6 +738,23 @@ mod tests {
         }
         for unknown in [r#"{"type":"wall"}"#, r#"{"type":"architecture"}"#, r#"{"type":"furniture","kind":"Bed"}"#] {
             assert!(serde_json::from_str::<Role>(unknown).is_err(), "{unknown}");
+        }
+    }
+
+    #[test]
+    fn a_flash_is_near_its_camera_and_shines() {
+        let flash = |offset_m: [f64; 3], intensity: Option<[f64; 3]>| {
+            let views = vec![ViewId::new("input").unwrap()];
+            Flash { offset_m, intensity, views, only_light: false }.fault().map(|(key, ..)| key)
+        };
+        for sound in [None, Some([0.0, 2.0, 0.0]), Some([1e-6; 3])] {
+            assert_eq!(flash([0.0, 2.0, 0.0], sound), None);
+        }
+        for far in [[1.5, 1.5, 0.0], [f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0]] {
+            assert_eq!(flash(far, None), Some("offset_m"));
+        }
+        for dark in [[0.0; 3], [-1.0, 1.0, 1.0], [f64::NAN, 1.0, 1.0], [f64::INFINITY; 3]] {
+            assert_eq!(flash([0.0; 3], Some(dark)), Some("intensity"));
         }
     }
 

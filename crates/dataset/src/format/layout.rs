@@ -124,6 +124,11 @@ impl SceneFolder {
         self.truth().join("measured.json")
     }
 
+    /// Whether colours were measured in the scene, as far as its ground truth is here.
+    pub fn has_measured(&self) -> bool {
+        self.measured().exists()
+    }
+
     /// `ground_truth/views/<view>/photo.exr`: the photo of another view of a captured scene.
     pub fn novel_photo(&self, view: &ViewId) -> PathBuf {
         self.truth_view(view).join("photo.exr")

@@ -88,6 +88,7 @@ impl EmissionMap {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Emission {
+    /// Surfaces that emit.
     Area {
         /// Indices of the surfaces that emit, in `reference.json`.
         surfaces: Vec<SurfaceIndex>,

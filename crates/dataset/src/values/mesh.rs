@@ -16,6 +16,7 @@ pub struct TriangleMesh {
 
 impl TriangleMesh {
     /// The corners of triangle `index`; panics where there is no such triangle.
+    #[inline]
     pub fn corners(&self, index: usize) -> [Vec3; 3] {
         self.triangles[index].map(|vertex| self.positions[vertex as usize])
     }

@@ -2,6 +2,8 @@
 //!
 //! Texels are counted from the top left; the centre of (x, y) lies at uv ((x + 0.5) / size, 1 - (y + 0.5) / size).
 
+use std::num::NonZero;
+
 use glam::{DVec2, DVec3};
 use mateval_image::Picture;
 
@@ -17,16 +19,29 @@ const BILINEAR_REACH: f64 = std::f64::consts::SQRT_2;
 pub struct UvAtlas {
     size: usize,
     corners: Vec<[DVec2; 3]>,
-    owners: Picture<Owner>,
+    owners: Picture<Option<Owner>>,
 }
 
+/// A triangle, and whether the texel's centre lies in it or only within bilinear reach of it.
+///
+/// It is twice the triangle's index plus 1, or plus 2 if the centre lies inside. Zero is left for an absent owner, so
+/// that a texel takes 4 bytes: an atlas has up to 16 million.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Owner {
-    Nobody,
-    /// The centre lies in the triangle.
-    Inside(u32),
-    /// The centre lies outside, but within bilinear reach of the triangle.
-    Near(u32),
+struct Owner(NonZero<u32>);
+
+impl Owner {
+    fn new(triangle: usize, inside: bool) -> Self {
+        let number = u32::try_from(2 * triangle + usize::from(inside) + 1).ok().and_then(NonZero::new);
+        Self(number.expect("readers take at most 2^31 bytes of indices, and a triangle has three indices"))
+    }
+
+    fn triangle(self) -> usize {
+        (self.0.get() - 1) as usize / 2
+    }
+
+    fn inside(self) -> bool {
+        self.0.get() & 1 == 0
+    }
 }
 
 impl UvAtlas {
@@ -34,7 +49,7 @@ impl UvAtlas {
     /// to the first. A mesh without uv owns no texel.
     pub fn new(mesh: &TriangleMesh, size: usize) -> Self {
         let corners = texel_corners(mesh, size);
-        let mut atlas = Self { size, corners, owners: Picture::filled(size, size, Owner::Nobody) };
+        let mut atlas = Self { size, corners, owners: Picture::filled(size, size, None) };
         atlas.claim_inside();
         atlas.claim_near();
         atlas
@@ -45,21 +60,20 @@ impl UvAtlas {
     }
 
     /// The triangle that the texel belongs to, and whether its centre lies inside.
+    #[inline]
     pub fn owner(&self, x: usize, y: usize) -> Option<(usize, bool)> {
-        match self.owners.get(x, y) {
-            Owner::Nobody => None,
-            Owner::Inside(triangle) => Some((triangle as usize, true)),
-            Owner::Near(triangle) => Some((triangle as usize, false)),
-        }
+        self.owners.get(x, y).map(|owner| (owner.triangle(), owner.inside()))
     }
 
     /// Barycentric weights of a place, in texels from the top left, in a triangle. They add to one and are negative
     /// outside. For a triangle without area they are those of its middle.
+    #[inline]
     pub fn barycentrics(&self, triangle: usize, place: DVec2) -> DVec3 {
         barycentrics(self.corners[triangle], place)
     }
 
     /// The weights of the triangle's place nearest to a place in texels.
+    #[inline]
     pub fn nearest_barycentrics(&self, triangle: usize, place: DVec2) -> DVec3 {
         let corners = self.corners[triangle];
         // Rounding may move a place on an edge slightly outside.
@@ -68,6 +82,7 @@ impl UvAtlas {
     }
 
     /// The area of a triangle in texels.
+    #[inline]
     pub fn texel_area(&self, triangle: usize) -> f64 {
         let [a, b, c] = self.corners[triangle];
         ((b - a).perp_dot(c - a) / 2.0).abs()
@@ -76,6 +91,14 @@ impl UvAtlas {
     /// Gives every texel without an owner the value of an owned one nearby, breadth first. Changes nothing where no
     /// texel has an owner.
     pub fn fill_gutters<T: Copy>(&self, picture: &mut Picture<T>) {
+        let pixels = picture.pixels_mut();
+        self.each_gutter_texel(|to, from| pixels[to] = pixels[from]);
+    }
+
+    /// Calls `take` once for every texel without an owner, with the index of its pixel and that of the neighbour whose
+    /// value it takes, in an order in which that neighbour already has its value. Calls nothing where no texel has an
+    /// owner.
+    pub fn each_gutter_texel(&self, mut take: impl FnMut(usize, usize)) {
         let size = self.size;
         let neighbours = |at: usize| {
             let (x, y) = (at % size, at / size);
@@ -87,7 +110,7 @@ impl UvAtlas {
             ];
             all.into_iter().flatten()
         };
-        let mut done: Vec<bool> = self.owners.pixels().iter().map(|owner| *owner != Owner::Nobody).collect();
+        let mut done: Vec<bool> = self.owners.pixels().iter().map(Option::is_some).collect();
         // Of the owned texels only those at the rim of a gutter give their value to a neighbour.
         let at_rim = |at: &usize| done[*at] && neighbours(*at).any(|neighbour| !done[neighbour]);
         let mut front: Vec<usize> = (0..done.len()).filter(at_rim).collect();
@@ -98,7 +121,7 @@ impl UvAtlas {
                     if std::mem::replace(&mut done[neighbour], true) {
                         continue;
                     }
-                    picture.pixels_mut()[neighbour] = picture.pixels()[at];
+                    take(neighbour, at);
                     next.push(neighbour);
                 }
             }
@@ -113,8 +136,8 @@ impl UvAtlas {
             }
             for (x, y) in self.texels_around(triangle, 0.0) {
                 let weights = self.barycentrics(triangle, centre(x, y));
-                if weights.min_element() >= 0.0 && self.owners.get(x, y) == Owner::Nobody {
-                    self.owners.set(x, y, Owner::Inside(triangle as u32));
+                if weights.min_element() >= 0.0 && self.owners.get(x, y).is_none() {
+                    self.owners.set(x, y, Some(Owner::new(triangle, true)));
                 }
             }
         }
@@ -128,7 +151,7 @@ impl UvAtlas {
                 continue;
             }
             for (x, y) in self.texels_around(triangle, BILINEAR_REACH) {
-                if matches!(self.owners.get(x, y), Owner::Inside(_)) {
+                if self.owners.get(x, y).is_some_and(Owner::inside) {
                     continue;
                 }
                 let place = centre(x, y);
@@ -136,7 +159,7 @@ impl UvAtlas {
                 let distance = nearest_in_triangle(self.corners[triangle], place).distance(place);
                 if distance <= BILINEAR_REACH && (distance as f32) < distances.get(x, y) {
                     distances.set(x, y, distance as f32);
-                    self.owners.set(x, y, Owner::Near(triangle as u32));
+                    self.owners.set(x, y, Some(Owner::new(triangle, false)));
                 }
             }
         }

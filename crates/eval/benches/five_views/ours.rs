@@ -37,7 +37,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
     let mut stages = vec![stage];
     let photo = photo(folder);
     let (fit, stage) = Stage::measure("fit", 0, || {
-        let target = FitTarget { photo: &photo, mask: None, exposure: 1.0 };
+        let target = FitTarget { photo: &photo, mask: None, exposure: 1.0, known: &[] };
         fit_lights(&FitRules::default(), &stream_c[0].by_seed[0], &target).unwrap()
     });
     stages.push(stage);

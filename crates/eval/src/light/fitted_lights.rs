@@ -6,14 +6,15 @@
 //! the render, so that the noise of the fit adds no bias to the squared error; the difference of the errors under
 //! either fit shows its noise. The truth is another renderer's picture, so nothing travels along and nothing is exact.
 //!
-//! Photos of a captured room are compared in the same way. Light is fitted to the input photo alone. Every other photo
-//! has an unknown exposure of its own: renders are multiplied by the factor that fits them to it best.
+//! Photos of a captured room are compared in the same way. Light is fitted to the input photo alone. If the exposure of
+//! another photo is not known, renders are multiplied by the factor that fits them to it best. A flash moves with the
+//! camera, so that every view with one has a world of its own.
 
 use mateval_dataset::layout::INPUT;
-use mateval_dataset::{Camera, RendererId, SceneLights};
+use mateval_dataset::{Camera, RendererId, SceneLights, ViewId};
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, exr_io};
-use mateval_light::light_fit::{FitTarget, TwoStreamFit, fit_two_streams};
-use mateval_light::light_stage;
+use mateval_light::light_fit::{FitTarget, LightFit, TwoStreamFit, fit_two_streams};
+use mateval_light::light_stage::{self, FLASH};
 use mateval_light::photo_pixels::{PhotoRules, exposure_factor};
 use mateval_metrics::scaled;
 use mateval_tracer::{LightBasis, LightMix, Lighting, Repaint, StageLight, ViewsRender, World};
@@ -21,7 +22,7 @@ use rayon::prelude::*;
 
 use crate::error::EvalError;
 use crate::light::difference::{LightDifference, ViewGuides, encoded, guided_mean, mean_of};
-use crate::light::shared_paths::{SharedPaths, batches, picture_of};
+use crate::light::shared_paths::{SharedPaths, ViewQuarters, batches, picture_of};
 use crate::metric::ColorPicture;
 use crate::protocol::{Protocol, Track};
 use crate::scene::{BaseColors, LitSink, LitViews, SceneTask};
@@ -31,10 +32,10 @@ use crate::truth::{ViewTruth, photo_of_renderer, sized};
 pub(crate) struct Photos {
     /// Linear radiance before exposure.
     pictures: Vec<Picture<LinearRgb>>,
-    /// The pixels that determine the exposure of a photo; none if that is the scene's own.
+    /// The pixels that determine the exposure of a photo; absent if that is known.
     free: Vec<Option<Mask>>,
-    /// The fit takes a channel that is at least this, exposed, as clipped.
-    clipped_from: f64,
+    /// The fit takes a channel of the input photo that is at least 1 at this exposure as clipped.
+    clipping_exposure: f64,
 }
 
 impl Photos {
@@ -43,7 +44,7 @@ impl Photos {
         Ok(Self {
             pictures: pictures.collect::<Result<_, _>>()?,
             free: vec![None; task.views.len()],
-            clipped_from: 1.0,
+            clipping_exposure: task.scene.exposure,
         })
     }
 
@@ -53,7 +54,9 @@ impl Photos {
         truths: &[ViewTruth],
         rules: &PhotoRules,
     ) -> Result<(Self, Vec<Mask>), EvalError> {
-        let mut photos = Self { pictures: Vec::new(), free: Vec::new(), clipped_from: rules.clipped_from.min(1.0) };
+        let exposure_of = |view: &ViewId| task.scene.clipping_exposure(view);
+        let clipping_exposure = exposure_of(&task.input_view()?.id) / rules.clipped_from.min(1.0);
+        let mut photos = Self { pictures: Vec::new(), free: Vec::new(), clipping_exposure };
         let mut all_counted = Vec::new();
         for (view, truth) in task.views.iter().zip(truths) {
             let shown = task.open.folder.view(&view.id);
@@ -61,9 +64,11 @@ impl Photos {
             let file = if is_input { shown.join("rgb.exr") } else { task.open.folder.novel_photo(&view.id) };
             let photo = sized(view, exr_io::read_linear(&file)?)?;
             let depth = sized(view, exr_io::read_scalar(&shown.join("depth.exr"))?)?;
-            let counted = rules.counted(&photo, task.scene.exposure, &depth, &truth.valid);
+            let counted = rules.counted(&photo, exposure_of(&view.id), &depth, &truth.valid);
             photos.pictures.push(photo);
-            photos.free.push((!is_input).then(|| counted.clone()));
+            let novel = task.scene.novel_photos.get(&view.id).filter(|_| !is_input);
+            let is_free = novel.is_some_and(|photo| photo.relative_exposure.is_none());
+            photos.free.push(is_free.then(|| counted.clone()));
             all_counted.push(counted);
         }
         Ok((photos, all_counted))
@@ -83,24 +88,18 @@ pub(crate) fn compare_under_fitted_lights(
     let exposed = |picture: &Picture<LinearRgb>| scaled(picture, [task.scene.exposure; 3]);
     let free = &photos.free;
     let references: Vec<ColorPicture> = photos.pictures.iter().map(|photo| ColorPicture::new(exposed(photo))).collect();
-    let paths = lit.paths(task, protocol);
-    let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
     let pixels = task.pixels().next().unwrap_or(0);
     // A batch holds a render and four quarters of every prediction under two fits, or two bases of the input view.
-    let pictures = (5 * 2 * task.views.len()).max(4 * lit.names.len()) as u64;
+    let pictures = (5 * 2 * task.views.len()).max(4 * (lit.names.len() + 1)) as u64;
     let bytes = pictures * pixels * size_of::<LinearRgb>() as u64;
     let all: Vec<usize> = (0..task.predictions.len()).collect();
     for batch in batches(task.predictions, &all, 0, bytes) {
         let predictions: Vec<_> = batch.iter().map(|&index| &task.predictions[index]).collect();
-        let repaint = paths.repaint(&predictions, None)?;
-        let fits = lit.fit(&paths, &repaint, task, truths, photos)?;
-        let weights = |fit: &TwoStreamFit| fit.streams.iter().map(|stream| stream.weights.clone()).collect();
-        let mixes: Vec<Vec<LightMix>> = fits.iter().map(weights).collect();
-        let picture =
-            |renders: &[ViewsRender], at: usize, fit: usize, view: usize| exposed(picture_of(&renders[at], view, fit));
-        let (quarters, not_finite) = paths.quarters(&repaint, &mixes, &cameras, batch.len(), picture)?;
+        let repaint = lit.input_paths(task, protocol)?.repaint(&predictions, None)?;
+        let fits = lit.fit(&repaint, task, truths, photos, protocol)?;
+        let (quarters, not_finite) = lit.quarters(&repaint, &fits, task, protocol, &exposed)?;
         for (at, (&index, fit)) in batch.iter().zip(fits).enumerate() {
-            let [first, second] = &quarters[at][..] else { unreachable!("two fits make two pictures") };
+            let [first, second] = &quarters[at];
             let ratios = base_colors.ratios(index);
             let guides = ViewGuides { truths, ratios: &ratios, references: &references };
             // The first half under the first fit, the second under the second.
@@ -112,7 +111,10 @@ pub(crate) fn compare_under_fitted_lights(
             };
             let of_fits = Some([under(first), under(second)]);
             let (track, not_finite) = (Track::Fitted, not_finite[at]);
-            let fit = Some(fit.radiances(&lit.names, lit.is_stage));
+            // The last name is unused if the input photo was taken without a flash, which then has no weight in the
+            // fit.
+            let names: Vec<String> = lit.names.iter().cloned().chain([FLASH.to_owned()]).collect();
+            let fit = Some(fit.radiances(&names, lit.is_stage));
             let views = plain_differences(&both, &guides, free);
             each(index, LitViews { track, lighting: None, references: &references, views, of_fits, fit, not_finite })?;
         }
@@ -151,30 +153,62 @@ fn plain_differences(
         .collect()
 }
 
-/// The lights whose radiances are fitted, in their world.
+/// The lights whose radiances are fitted, and a flash.
 struct FittedLights {
-    world: World,
+    /// Worlds with the places of the views that each is rendered for. A view whose photo was taken with a flash has a
+    /// world of its own, in which the flash is the last light.
+    worlds: Vec<(World, Vec<usize>)>,
+    /// The names of the lights, apart from the flash.
     names: Vec<String>,
     is_stage: bool,
+    /// The intensity of the flash, where it is known.
+    flash: Option<[f64; 3]>,
 }
 
 impl FittedLights {
     fn new(task: &SceneTask<'_>, protocol: &Protocol) -> Result<Self, EvalError> {
         if task.scene.lights == SceneLights::Own {
             let names = task.open.world.scene().lights.iter().map(|light| light.name.clone()).collect();
-            return Ok(Self { world: task.open.world.clone(), names, is_stage: false });
+            let worlds = vec![(task.open.world.clone(), (0..task.views.len()).collect())];
+            return Ok(Self { worlds, names, is_stage: false, flash: None });
         }
         let stage = light_stage::scene_lights(&protocol.light.stage, task.scene, &task.open.world);
-        let quads: Vec<StageLight> = stage.iter().map(|named| named.light.clone()).collect();
+        let mut quads: Vec<StageLight> = stage.iter().map(|named| named.light.clone()).collect();
         let names = stage.into_iter().map(|named| named.name).collect();
-        Ok(Self { world: task.open.world.on_stage(&quads)?, names, is_stage: true })
+        let flash = task.scene.flash.as_ref();
+        let has_flash = |view: &usize| flash.is_some_and(|flash| flash.views.contains(&task.views[*view].id));
+        let (lit, others): (Vec<usize>, Vec<usize>) = (0..task.views.len()).partition(has_flash);
+        let mut worlds = Vec::new();
+        if !others.is_empty() {
+            worlds.push((task.open.world.on_stage(&quads)?, others));
+        }
+        if let Some(flash) = flash {
+            for view in lit {
+                quads.push(light_stage::flash_light(flash, &task.views[view].camera));
+                worlds.push((task.open.world.on_stage(&quads)?, vec![view]));
+                quads.pop();
+            }
+        }
+        Ok(Self { worlds, names, is_stage: true, flash: flash.and_then(|flash| flash.intensity) })
     }
 
-    fn paths<'a>(&'a self, task: &'a SceneTask<'a>, protocol: &'a Protocol) -> SharedPaths<'a> {
+    /// The paths of the world that shows the input view.
+    fn input_paths<'a>(
+        &'a self,
+        task: &'a SceneTask<'a>,
+        protocol: &'a Protocol,
+    ) -> Result<SharedPaths<'a>, EvalError> {
+        let input = task.views.iter().position(|view| view.id.as_str() == INPUT);
+        let shown = input.and_then(|input| self.worlds.iter().find(|(_, views)| views.contains(&input)));
+        let (world, _) = shown.ok_or_else(|| EvalError::InputNotTarget { scene: task.scene.id.clone() })?;
+        Ok(self.paths(world, task, protocol))
+    }
+
+    fn paths<'a>(&'a self, world: &'a World, task: &'a SceneTask<'a>, protocol: &'a Protocol) -> SharedPaths<'a> {
         let pass = if self.is_stage { "stage" } else { "fitted" };
         SharedPaths {
             scene: &task.scene.id,
-            world: &self.world,
+            world,
             atlases: &task.open.atlases,
             rules: &protocol.light,
             pass: task.set.pass(pass),
@@ -184,12 +218,13 @@ impl FittedLights {
 
     fn fit(
         &self,
-        paths: &SharedPaths<'_>,
         repaint: &Repaint,
         task: &SceneTask<'_>,
         truths: &[ViewTruth],
         photos: &Photos,
+        protocol: &Protocol,
     ) -> Result<Vec<TwoStreamFit>, EvalError> {
+        let paths = self.input_paths(task, protocol)?;
         let input = task.input_view()?;
         let place = task.views.iter().position(|view| view.id == input.id);
         let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: task.scene.id.clone() })?;
@@ -200,9 +235,53 @@ impl FittedLights {
             Ok(renders.into_iter().map(|mut render| render.views.remove(0).by_seed.remove(0)).collect())
         };
         let (first, second) = (bases("fit_a")?, bases("fit_b")?);
-        let exposure = task.scene.exposure / photos.clipped_from;
-        let target = FitTarget { photo: &photos.pictures[place], mask: Some(&truths[place].valid), exposure };
+        let has_flash = paths.world.emitters().groups() > self.names.len();
+        let target = FitTarget {
+            photo: &photos.pictures[place],
+            mask: Some(&truths[place].valid),
+            exposure: photos.clipping_exposure,
+            known: if has_flash { self.flash.as_slice() } else { &[] },
+        };
         let pairs = first.iter().zip(&second);
         Ok(pairs.map(|(a, b)| fit_two_streams(&paths.rules.fit, [a, b], &target)).collect::<Result<_, _>>()?)
+    }
+
+    /// The quarters of every prediction under each of its two fits, `exposed`, and the number of contributions of each
+    /// that were not finite.
+    fn quarters(
+        &self,
+        repaint: &Repaint,
+        fits: &[TwoStreamFit],
+        task: &SceneTask<'_>,
+        protocol: &Protocol,
+        exposed: &(dyn Fn(&Picture<LinearRgb>) -> Picture<LinearRgb> + Sync),
+    ) -> Result<(Vec<[ViewQuarters; 2]>, Vec<u64>), EvalError> {
+        let blank = || [(); 2].map(|()| vec![Vec::new(); task.views.len()]);
+        let mut quarters: Vec<[ViewQuarters; 2]> = fits.iter().map(|_| blank()).collect();
+        let mut not_finite = vec![0; fits.len()];
+        for (world, views) in &self.worlds {
+            let mix = |fit: &TwoStreamFit| fit.streams.iter().map(|stream| self.mix(world, stream)).collect();
+            let mixes: Vec<Vec<LightMix>> = fits.iter().map(mix).collect();
+            let cameras: Vec<Camera> = views.iter().map(|&view| task.views[view].camera).collect();
+            let picture = |renders: &[ViewsRender], at: usize, fit: usize, view: usize| {
+                exposed(picture_of(&renders[at], view, fit))
+            };
+            let paths = self.paths(world, task, protocol);
+            let (found, counts) = paths.quarters(repaint, &mixes, &cameras, fits.len(), picture)?;
+            for (all, found) in quarters.iter_mut().zip(found) {
+                for (all, found) in all.iter_mut().zip(found) {
+                    views.iter().zip(found).for_each(|(&view, found)| all[view] = found);
+                }
+            }
+            not_finite.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        }
+        Ok((quarters, not_finite))
+    }
+
+    /// The weights of a world's lights under a fit to the input view.
+    fn mix(&self, world: &World, fit: &LightFit) -> LightMix {
+        let (lights, of_flash) = fit.weights.split_at(self.names.len());
+        let flash = of_flash.first().copied().or(self.flash);
+        lights.iter().copied().chain(flash).take(world.emitters().groups()).collect()
     }
 }

@@ -1,6 +1,8 @@
 //! Predictions under the scene's own emitters, compared with R.
 
 use mateval_dataset::Camera;
+use mateval_dataset::dataset::View;
+use mateval_dataset::layout::SceneFolder;
 use mateval_dataset::lighting::{LightingName, light_of, weighted};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_tracer::emitter::group_shares::shares_for;
@@ -92,15 +94,23 @@ pub(super) fn compare_under_own_lights(
     Ok(())
 }
 
+/// The light of each group in R's input view, which decides the scene's lightings.
+pub(crate) fn light_of_groups(
+    folder: &SceneFolder,
+    input: &View,
+    reference: &StoredReference,
+) -> Result<Vec<[f64; 3]>, EvalError> {
+    let valid = png_io::read_mask(&folder.view(&input.id).join("valid.png"))?;
+    Ok(reference.groups(input)?.iter().map(|group| light_of(group, &valid)).collect())
+}
+
 /// The lightings of the protocol with R in each view, and the light of each group in R's input view.
 fn own_lightings(
     task: &SceneTask<'_>,
     reference: &StoredReference,
     protocol: &Protocol,
 ) -> Result<(Vec<OwnLighting>, Vec<[f64; 3]>), EvalError> {
-    let input = task.input_view()?;
-    let valid = png_io::read_mask(&task.open.folder.view(&input.id).join("valid.png"))?;
-    let group_light: Vec<[f64; 3]> = reference.groups(input)?.iter().map(|group| light_of(group, &valid)).collect();
+    let group_light = light_of_groups(&task.open.folder, task.input_view()?, reference)?;
     let groups = task.open.world.emitters().groups();
     if group_light.len() != groups {
         let what = format!("it has {} light groups, the scene has {groups}", group_light.len());

@@ -75,8 +75,13 @@ fn colors<'a>(
 }
 
 impl SceneTask<'_> {
-    /// Compares every submission with the measured colours, under the `protocols` of these numbers.
+    /// Compares every submission with the measured colours, if the scene has any, under the `protocols` of these
+    /// numbers.
     pub(crate) fn score_measured(&self, protocols: &[usize], sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
+        // A file that the manifest lists exists, since opening the scene checked it.
+        if !self.open.folder.has_measured() {
+            return Ok(());
+        }
         let measured = Measured::read(&self.open.folder, &self.views)?;
         let predictions: Vec<&PredictedScene> = self.predictions.iter().collect();
         for view in &self.views {

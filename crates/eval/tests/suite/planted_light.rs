@@ -98,7 +98,7 @@ fn weak_ridge() -> FitRules {
 
 /// A photo of which nothing is clipped.
 fn target<'a>(photo: &'a Picture<LinearRgb>, truth: &'a ViewTruth) -> FitTarget<'a> {
-    FitTarget { photo, mask: Some(&truth.valid), exposure: 1e-3 }
+    FitTarget { photo, mask: Some(&truth.valid), exposure: 1e-3, known: &[] }
 }
 
 /// The relative errors of all lights and channels, sorted.

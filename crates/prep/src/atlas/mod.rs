@@ -274,6 +274,11 @@ mod tests {
             [(0, fixed), (1, fixed), (0, fine), (1, coarse)].map(|(at, size)| Wanted { mesh: &copies[at], size });
         let made: Vec<Unwrapped> = unwrap_copies(&shape, &wanted, None).into_iter().map(Result::unwrap).collect();
         assert_eq!(made[0].mesh.uvs, made[1].mesh.uvs);
+        assert_eq!(
+            (made[3].size, &made[3].mesh.uvs),
+            (made[0].size, &made[0].mesh.uvs),
+            "the size decides, and not the wish"
+        );
         for (unwrapped, Wanted { mesh, .. }) in made.iter().zip(wanted) {
             assert!((0..mesh.triangles.len()).all(|at| unwrapped.mesh.corners(at) == mesh.corners(at)));
         }

@@ -100,9 +100,12 @@ fn bake_texels(atlas: &UvAtlas, texel: impl Fn(usize, usize) -> Option<Appearanc
             metallic.set(x, y, byte_from_unit(seen.metallic));
         }
     }
-    atlas.fill_gutters(&mut base_color);
-    atlas.fill_gutters(&mut roughness);
-    atlas.fill_gutters(&mut metallic);
+    let (colors, rough, metals) = (base_color.pixels_mut(), roughness.pixels_mut(), metallic.pixels_mut());
+    atlas.each_gutter_texel(|to, from| {
+        colors[to] = colors[from];
+        rough[to] = rough[from];
+        metals[to] = metals[from];
+    });
     Baked { material: BakedMaterial::Textured { base_color, roughness, metallic }, clipped }
 }
 

@@ -3,6 +3,7 @@
 use mateval_dataset::{Finding, Severity};
 use mateval_files::source_folder::FileFault;
 use mateval_image::ImageError;
+use mateval_image::photo::CameraExposure;
 use mateval_sources::blend::BakeFault;
 use mateval_sources::front3d::camera_sampler::CameraError;
 
@@ -119,6 +120,25 @@ pub enum PhotoFault {
          program that computed its camera"
     )]
     Lens { file: String, k: [f64; 4] },
+    #[error(
+        "'{file}' holds integers, which are clipped at their largest number; leave out `white`, which is for photos of \
+         floating-point numbers"
+    )]
+    White { file: String },
+    #[error(
+        "nearly all pixels of '{file}' reach `white`, {white}; expected the number at which its bright pixels are cut off"
+    )]
+    Clipped { file: String, white: f64 },
+    #[error(
+        "'{file}': `exposures` states {table}, and the EXIF data of the photo {exif}; correct the one that is wrong, \
+         or remove the EXIF data"
+    )]
+    Exposures { file: String, table: CameraExposure, exif: CameraExposure },
+    #[error(
+        "'{file}' states no exposure in its EXIF data (time, ISO and f-number), as `exif` expects; state it in \
+         `exposures`, or leave `exif` out"
+    )]
+    NoExposure { file: String },
     /// The photo shows more or less than the camera, or is smaller than its picture.
     #[error(
         "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; \

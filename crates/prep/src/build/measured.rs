@@ -37,17 +37,18 @@ pub(super) struct SceneRegions {
     picture: Picture<u16>,
 }
 
-/// Reads the measured colours of the input photo, if the scene is captured, and lists their files among the source's.
-/// `root` is the folder of the recipe's paths.
+/// Reads the measured colours of the input photo, if the scene is captured and has any, and lists their files among the
+/// source's. `root` is the folder of the recipe's paths.
 pub(super) fn read_regions(
     entry: &RecipeScene,
     root: &Path,
     scene: &mut SourceScene,
     input: &View,
 ) -> Result<Option<SceneRegions>, PrepError> {
-    let (Some(room), Some(captured)) = (&entry.capture, &scene.captured) else { return Ok(None) };
+    let measured = entry.capture.as_ref().and_then(|room| room.measured.as_ref());
+    let (Some(measured), Some(captured)) = (measured, &scene.captured) else { return Ok(None) };
     let mut folder = SourceFolder::new(root, FILE_BYTES).map_err(FileError::io("open", root))?;
-    let file = room.measured.to_string_lossy().into_owned();
+    let file = measured.to_string_lossy().into_owned();
     let measurements = measured::read(&mut folder, &file)?;
     let of_photo = regions_of(measurements, &captured.file);
     let picture = of_photo.and_then(|own| Ok((regions_picture(&mut folder, &own, &captured.lens, input)?, own)));

@@ -343,6 +343,7 @@ fn write_scene_file(
     }
     let mut findings = plan.findings;
     findings.sort();
+    let flash = entry.capture.as_ref().and_then(|room| room.flash_of(&plan.views));
     let file = SceneFile {
         format: FORMAT.to_owned(),
         id: entry.id.clone(),
@@ -352,6 +353,7 @@ fn write_scene_file(
         exposure: entry.exposure,
         photo: plan.photo.map(|photo| photo.listed),
         novel_photos: plan.novel_photos.into_iter().map(|(view, photo)| (view, photo.listed)).collect(),
+        flash,
         redressed: plan.redressed,
         views: plan.views,
         instances,

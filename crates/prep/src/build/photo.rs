@@ -12,14 +12,14 @@ use mateval_dataset::{Finding, Severity, ViewId};
 use mateval_files::FileError;
 use mateval_files::source_folder::{FileFault, LookedFor, SourceFolder};
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::photo::PhotoFile;
+use mateval_image::photo::{CameraExposure, PhotoFile};
 use mateval_image::texture_io::Encoding;
 use mateval_image::{LinearRgb, Picture};
 use mateval_sources::source_scene::{CapturedPhoto, SourceScene};
 
 use super::fault::{BuildFault, PhotoFault};
 use crate::error::PrepError;
-use crate::recipe::RecipeScene;
+use crate::recipe::{CapturedRoom, RecipeScene};
 use crate::views::write_preview;
 
 /// The largest file of a photo, in bytes: one of 64 million pixels of 32-bit numbers has 805 million.
@@ -48,7 +48,7 @@ pub(super) fn read_photo(
 ) -> Result<Option<ScenePhoto>, PrepError> {
     let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
     let photo = match (&scene.captured, &entry.photo) {
-        (Some(captured), _) => captured_photo(captured, &scene.camera, entry.exposure).map_err(fault)?,
+        (Some(captured), _) => captured_photo(captured, &scene.camera, entry).map_err(fault)?,
         (None, Some(path)) => {
             let root = entry.root(source);
             let mut folder = SourceFolder::new(&root, MAX_PHOTO_BYTES).map_err(FileError::io("open", &root))?;
@@ -74,19 +74,63 @@ pub(super) fn read_novel_photos(
 ) -> Result<Vec<(Camera, ScenePhoto)>, PrepError> {
     let fault = |fault| PrepError::scene(&entry.id)(BuildFault::Photo(fault));
     let Intrinsics { width, height, .. } = scene.camera.intrinsics;
+    let input = match (&entry.capture, &scene.captured) {
+        (Some(room), Some(input)) => camera_exposure(room, &room.input, input).map_err(fault)?,
+        _ => None,
+    };
+    let named = entry.capture.iter().flat_map(|room| room.novel.iter().map(move |name| (room, name)));
     let mut all = Vec::new();
-    for (path, camera) in std::mem::take(&mut scene.novel) {
+    for ((path, camera), (room, name)) in std::mem::take(&mut scene.novel).into_iter().zip(named) {
         let (captured, file) = read_captured(root, &path, camera.lens).map_err(fault)?;
         scene.read.files.extend(file);
         let intrinsics = pinhole(&captured, [width, height]).map_err(fault)?;
         let camera = Camera::from_rotation(camera.rotation, camera.position, intrinsics);
-        let photo = captured_photo(&captured, &camera, entry.exposure).map_err(fault)?;
+        let mut photo = captured_photo(&captured, &camera, entry).map_err(fault)?;
+        let own = camera_exposure(room, name, &captured).map_err(fault)?;
+        if let (Some(input), Some(own)) = (input, own) {
+            photo.bring_to_exposure(own.factor() / input.factor());
+        }
         scene.read.findings.extend(photo.transparency());
         all.push((camera, photo));
     }
     scene.read.files.hashes.dedup();
     scene.read.findings.sort();
     Ok(all)
+}
+
+/// The largest share of pixels that reach `white`; beyond it nothing is left to fit lights to.
+const MOST_CLIPPED: f64 = 0.99;
+
+/// The largest ratio of the exposures of a table and of EXIF data, which rounds times such as 1/60 s.
+const SAME_EXPOSURE: f64 = 1.05;
+
+/// The exposure of the photo that the recipe names `name`, where the recipe states or asks for it.
+fn camera_exposure(
+    room: &CapturedRoom,
+    name: &str,
+    captured: &CapturedPhoto,
+) -> Result<Option<CameraExposure>, PhotoFault> {
+    same_exposure(&captured.file, room.exposures.get(name).copied(), captured.photo.exposure(), room.exif)
+}
+
+/// The exposure of a photo by the recipe's table and by its EXIF data. If both state one, they must agree; EXIF data
+/// alone counts only if it `is_wanted`.
+fn same_exposure(
+    file: &str,
+    table: Option<CameraExposure>,
+    exif: Option<CameraExposure>,
+    is_wanted: bool,
+) -> Result<Option<CameraExposure>, PhotoFault> {
+    let file = || file.to_owned();
+    match (table, exif) {
+        (Some(table), Some(exif)) => {
+            let ratio = table.factor() / exif.factor();
+            let is_same = (1.0 / SAME_EXPOSURE..=SAME_EXPOSURE).contains(&ratio);
+            is_same.then_some(Some(table)).ok_or_else(|| PhotoFault::Exposures { file: file(), table, exif })
+        }
+        (None, None) if is_wanted => Err(PhotoFault::NoExposure { file: file() }),
+        (table, exif) => Ok(table.or(exif.filter(|_| is_wanted))),
+    }
 }
 
 /// Reads the photo at `path` in the folder `root`, whose camera has this lens. Returns also the file with its hash.
@@ -121,7 +165,7 @@ pub(super) fn pinhole(captured: &CapturedPhoto, size: [u32; 2]) -> Result<Intrin
 }
 
 /// The photo of a captured room, undistorted to the camera's picture.
-fn captured_photo(captured: &CapturedPhoto, camera: &Camera, exposure: f64) -> Result<ScenePhoto, PhotoFault> {
+fn captured_photo(captured: &CapturedPhoto, camera: &Camera, entry: &RecipeScene) -> Result<ScenePhoto, PhotoFault> {
     let CapturedPhoto { file, photo, lens } = captured;
     let Intrinsics { width, height, .. } = camera.intrinsics;
     let (columns, rows) = (width as usize, height as usize);
@@ -131,7 +175,20 @@ fn captured_photo(captured: &CapturedPhoto, camera: &Camera, exposure: f64) -> R
             lens.place(camera.intrinsics.direction(DVec2::from_array(place))).to_array()
         }),
     };
-    scene_photo(file.clone(), photo, picture, Some(*lens), exposure)
+    let white = entry.capture.as_ref().and_then(|room| room.white);
+    if white.is_some() && photo.encoding() == Encoding::Srgb {
+        return Err(PhotoFault::White { file: file.clone() });
+    }
+    if let Some(white) = white {
+        let is_clipped = |LinearRgb(rgb): &&LinearRgb| rgb.iter().any(|value| f64::from(*value) >= white);
+        let clipped = picture.pixels().iter().filter(is_clipped).count();
+        if clipped as f64 > MOST_CLIPPED * picture.pixels().len() as f64 {
+            return Err(PhotoFault::Clipped { file: file.clone(), white });
+        }
+    }
+    let mut found = scene_photo(file.clone(), photo, picture, Some(*lens), entry.exposure)?;
+    found.listed.white = white;
+    Ok(found)
 }
 
 fn read_file(folder: &mut SourceFolder, path: &str) -> Result<(String, PhotoFile), PhotoFault> {
@@ -178,7 +235,8 @@ fn scene_photo(
         return Err(PhotoFault::Black { file, largest, exposure });
     }
     let transparent_share = photo.transparent_share();
-    Ok(ScenePhoto { listed: Photo { file, size, encoding, lens }, picture, transparent_share })
+    let listed = Photo { file, size, encoding, white: None, relative_exposure: None, lens };
+    Ok(ScenePhoto { listed, picture, transparent_share })
 }
 
 /// Whether a photo is at least as large as the camera's picture and, reduced to its width, less than half a row higher
@@ -189,6 +247,12 @@ fn fits(photo: [u32; 2], [width, height]: [u32; 2]) -> bool {
 }
 
 impl ScenePhoto {
+    /// Divides the picture by its exposure `relative` to that of the input photo.
+    fn bring_to_exposure(&mut self, relative: f64) {
+        self.listed.relative_exposure = Some(relative);
+        self.picture = self.picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) / relative) as f32)));
+    }
+
     pub(super) fn picture(&self) -> &Picture<LinearRgb> {
         &self.picture
     }
@@ -243,6 +307,27 @@ mod tests {
         assert!(matches!(read("a.png", 1e9), Err(PhotoFault::Black { .. })));
         write([1, 0, 0, 7]);
         assert_eq!(read("a.png", 1e-9).ok().unwrap().transparent_share, 0.5);
+    }
+
+    /// A table and EXIF data that agree up to the rounding of a time. In the twins they contradict each other, or one
+    /// of them or both are missing.
+    #[test]
+    fn an_exposure_is_that_of_the_table_unless_exif_data_contradicts_it() {
+        let of = |time_s: f64| CameraExposure { time_s, iso: 100.0, f_number: 2.0 };
+        let found = |table: Option<f64>, in_file: Option<f64>, exif: bool| {
+            same_exposure("a.jpg", table.map(of), in_file.map(of), exif).map(|found| found.map(|found| found.time_s))
+        };
+        assert_eq!(found(Some(0.0167), Some(1.0 / 60.0), false).unwrap(), Some(0.0167));
+        assert_eq!(found(Some(0.02), None, true).unwrap(), Some(0.02));
+        assert_eq!(found(None, Some(0.02), true).unwrap(), Some(0.02));
+        // Without a word of the recipe, every photo keeps an exposure of its own.
+        assert_eq!(found(None, Some(0.02), false).unwrap(), None);
+        assert_eq!(found(None, None, false).unwrap(), None);
+        let said = found(Some(0.02), Some(0.04), true).unwrap_err().to_string();
+        assert!(said.contains("'a.jpg': `exposures` states 0.02 s at ISO 100 and f/2"), "{said}");
+        assert!(said.contains("the EXIF data of the photo 0.04 s at ISO 100 and f/2"), "{said}");
+        let said = found(None, None, true).unwrap_err().to_string();
+        assert!(said.contains("'a.jpg' states no exposure in its EXIF data"), "{said}");
     }
 
     #[test]

@@ -75,11 +75,11 @@ pub enum State {
     Differs,
     /// Neither: the noise may hide a fault.
     TooNoisy,
-    /// A picture has so few samples that its halves do not state how noisy it is.
+    /// A picture has fewer samples per pixel of a half than `bounds.least_samples`, which do not state how noisy it is.
     TooFew,
-    /// Nothing was left to compare.
+    /// Nothing was left to compare, for example because every tile shows glass or metal.
     Undecided,
-    /// The file does not exist.
+    /// The file does not exist; for a whole view the picture is `render`.
     Missing,
     /// The file cannot be read, or has another size.
     Unreadable,

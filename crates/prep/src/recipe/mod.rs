@@ -15,15 +15,16 @@ use mateval_dataset::{SceneId, SourceKind, ViewId};
 use mateval_files::FileError;
 use mateval_files::untrusted::{hint, mistaken_for, read_at_most, without_mark};
 use mateval_sources::front3d::camera_rules::CameraRules;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::error::PrepError;
 pub(crate) use fault::RESOLUTION;
-use fault::{RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
+use fault::{ATLAS_SIZES, RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
 pub(crate) use scene::SourcePath;
 pub use scene::{
-    AppearanceWord, Availability, CapturedRoom, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene, RecipeSource,
-    Redress,
+    AppearanceWord, Availability, CapturedFlash, CapturedRoom, Front3dRoom, GivenCamera, RecipeCamera, RecipeScene,
+    RecipeSource, Redress,
 };
 
 /// The name of the recipe in the dataset.
@@ -32,35 +33,47 @@ pub const RECIPE: &str = "recipe.toml";
 /// The most samples a pixel.
 pub const MOST_SAMPLES: u32 = 1 << 16;
 
-/// A recipe as written.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// The TOML file that a dataset is built from: the scenes, and the settings of their views, pictures and atlases.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
+    /// The dataset's name; not empty.
     pub name: String,
+    /// The dataset's version.
     #[serde(default = "default_version")]
     pub version: String,
-    /// Width and height in pixels; if absent, the source's own.
+    /// Width and height of pictures in pixels; if absent, the source's own, and for `front3d` those of the
+    /// `camera_rules`.
+    #[schemars(inner(range(min = *RESOLUTION.start(), max = *RESOLUTION.end())))]
     pub resolution: Option<[u32; 2]>,
-    /// The novel views, as turns of the input camera; empty for a dataset of input views only.
+    /// The novel views, as turns of the input camera; if absent, the four of format/dataset.md, "Camera". An empty list
+    /// makes a dataset of input views only.
     #[serde(default = "default_views")]
     pub views: Vec<Offset>,
-    /// Novel views from other places; none if absent.
+    /// Novel views from other places, in every scene; none if absent. Either `count` and `distance_m`, for places that
+    /// are drawn, or `views`.
     pub wide: Option<WideViews>,
-    /// Texels a side of every atlas; if absent, chosen by what the input view shows.
+    /// Texels a side of every atlas; if absent, chosen by what the input view shows: format/dataset.md, "Atlas".
+    #[schemars(range(min = *ATLAS_SIZES.start(), max = *ATLAS_SIZES.end()))]
     pub atlas_size: Option<u32>,
-    /// The materials of which the truth is made.
+    /// The materials of the truth.
     #[serde(default)]
     pub materials: TrueMaterials,
     /// The rules of cameras that are drawn.
     #[serde(default, deserialize_with = "camera_rules")]
     pub camera_rules: CameraRules,
-    /// Samples a pixel of each half of a rendered picture.
+    /// Samples a pixel of **each** half of a rendered picture.
     #[serde(default = "default_samples")]
+    #[schemars(range(min = 1, max = MOST_SAMPLES))]
     pub samples: u32,
-    /// The licence of each kind of source, as text; in addition to files that come with scenes.
+    /// By the key of a source, the licence of all its scenes, as its name or its text. `dataset.json` states it beside
+    /// the text of a file `LICENSE` or `LICENSE.txt` in the folder of a scene; exports warn if a scene has neither.
     #[serde(default)]
     pub licences: BTreeMap<SourceKind, String>,
+    /// The scenes, at least one.
+    // A recipe without scenes is read, so that this fault is reported together with others.
     #[serde(default, rename = "scene")]
+    #[schemars(!default, length(min = 1))]
     pub scenes: Vec<RecipeScene>,
 }
 
@@ -156,13 +169,16 @@ impl Recipe {
 }
 
 /// A novel view: the input camera turned about its own axes.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Offset {
+    /// The view's id, which does not begin with `wide_`.
     pub id: ViewId,
-    /// Degrees about X; up is positive.
+    /// The turn about X; up is positive.
+    #[schemars(range(min = -90, max = 90))]
     pub x_deg: f64,
-    /// Degrees about Y, after X; left is positive.
+    /// The turn about Y, after X; left is positive.
+    #[schemars(range(min = -180, max = 180))]
     pub y_deg: f64,
 }
 
@@ -179,8 +195,9 @@ const COUNTS: RangeInclusive<u32> = 1..=16;
 const DISTANCES_M: RangeInclusive<f64> = 0.05..=10.0;
 
 /// The wide views of every scene of a recipe.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "WideWords")]
+#[schemars(with = "WideWords")]
 pub enum WideViews {
     Drawn(DrawnViews),
     /// At the same offsets in each scene.
@@ -198,22 +215,29 @@ pub struct DrawnViews {
 }
 
 /// A wide view at a given place. It looks at the same point as all wide views.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WideOffset {
     /// The view's id, which begins with `wide_`.
     pub id: ViewId,
-    /// Metres along the input camera's own axes: right, up, and away from what it looks at.
+    /// From the input camera along its own axes: right, up, and away from what it looks at.
     pub offset_m: [f64; 3],
 }
 
 /// The keys as they are in the file.
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct WideWords {
+    /// The number of views that are drawn, `wide_1` and so on.
+    #[schemars(range(min = *COUNTS.start(), max = *COUNTS.end()))]
     count: Option<u32>,
+    /// How far the first and the last drawn view are from the input camera, the nearer first; the distances of the
+    /// others lie evenly in between.
+    #[schemars(inner(range(min = *DISTANCES_M.start(), max = *DISTANCES_M.end())))]
     distance_m: Option<[f64; 2]>,
+    /// The seed by which places are drawn; 0 if absent.
     seed: Option<u64>,
+    /// Views at given places, in place of drawn ones.
     views: Option<Vec<WideOffset>>,
 }
 

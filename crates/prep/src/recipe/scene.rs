@@ -3,106 +3,154 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_dataset::dataset::{Flash, View};
 use mateval_dataset::lighting::LightingName;
 use mateval_dataset::{PartSetId, SceneId, SourceKind};
 use mateval_files::source_folder::SourceFolder;
 use mateval_files::untrusted::shortened;
+use mateval_image::photo::CameraExposure;
 use mateval_sources::front3d::AppearanceRule;
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::fault::{FARTHEST_M, RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
+use super::fault::{ATLAS_SIZES, FARTHEST_M, RESOLUTION, RecipeFault, RecipeSceneFault, ValueFault, check_sizes};
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// A scene of the dataset. It has exactly one source: `bitterli`, `front3d`, `gltf`, `blend` or `capture`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeScene {
+    /// The scene's id.
     pub id: SceneId,
-    /// The scene's Mitsuba XML. Every scene names exactly one source.
+    /// The source: a Mitsuba scene, its XML. Everything that it needs lies in the same folder.
     pub bitterli: Option<PathBuf>,
-    /// A room of a 3D-FRONT house.
+    /// The source: a room of a 3D-FRONT house.
     pub front3d: Option<Front3dRoom>,
-    /// A glTF file, .glb or .gltf.
+    /// The source: a glTF 2.0 file, `.glb` or `.gltf`. Everything that it needs lies in the same folder.
     pub gltf: Option<PathBuf>,
-    /// A Blender file, whose materials Blender bakes.
+    /// The source: a Blender file, whose materials Blender bakes. Everything that it needs lies in the same folder.
     pub blend: Option<PathBuf>,
-    /// A real room that was scanned and photographed.
+    /// The source: a real room that was scanned and photographed.
     pub capture: Option<CapturedRoom>,
-    /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder, the house's uid, or
-    /// the glTF's name.
+    /// The house that the scene belongs to; rankings treat scenes of one house as one. If absent, the name of the XML's
+    /// folder, the house's uid, the name of the glTF or Blender file without its ending, or that of the mesh's folder.
     pub house: Option<String>,
-    /// The input camera; if absent, the camera of the Mitsuba scene or of the glTF.
+    /// The input camera: `position`, `target` and `fov_y_deg`, or for `front3d` also `seed` or `designer`. If absent,
+    /// the source's own; `front3d` requires one, and `capture` has its own.
     pub camera: Option<RecipeCamera>,
-    /// The input picture, where it is not rendered: a photo that the camera took.
+    /// The input picture in place of a render, as the camera took it: a PNG, JPEG, WebP, TIFF, BMP, Radiance HDR or
+    /// OpenEXR file. Rendered if absent.
     pub photo: Option<PathBuf>,
-    /// Other materials for the scene's, drawn with a secret key; the source's own if absent.
+    /// Other materials for the whole room, drawn with a secret key; the source's own if absent. Not together with
+    /// `photo` or `capture`.
     pub redress: Option<Redress>,
     /// Whether others have the files of the source.
     #[serde(default, rename = "source")]
     pub availability: Availability,
-    /// Lightings in which the scene is shown again, as further scenes. Their constancy is scored.
+    /// Lightings under which the scene is shown again, as further scenes; their constancy is scored. Not together with
+    /// `photo` or `capture`.
     #[serde(default)]
     pub twins: Vec<LightingName>,
-    /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
+    /// Further sets of parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
     pub part_labels: BTreeMap<PartSetId, PathBuf>,
     /// SHA-256 of every file that the scene is made of, by its path as `scene.json` lists it under `source`. If any
-    /// other byte is read, the scene is refused. Not checked if empty.
+    /// other byte is read, the scene is refused. Not checked if absent.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
-    /// Accept a scene that lacks more than a fifth of its models, meshes or textures.
+    /// Accept a scene that lacks more than 20 % of its models, meshes or textures.
     #[serde(default)]
     pub allow_missing: bool,
     /// Accept a scene whose source does not state the base colour of more than 5 % of the scored pixels.
     #[serde(default)]
     pub allow_unstated: bool,
-    /// Overrides the recipe's.
+    /// Width and height of its pictures in pixels; the recipe's if absent.
+    #[schemars(inner(range(min = *RESOLUTION.start(), max = *RESOLUTION.end())))]
     pub resolution: Option<[u32; 2]>,
-    /// Overrides the recipe's.
+    /// Texels a side of its atlases; the recipe's if absent.
+    #[schemars(range(min = *ATLAS_SIZES.start(), max = *ATLAS_SIZES.end()))]
     pub atlas_size: Option<u32>,
-    /// Multiplies every RGB picture before clipping.
+    /// Multiplies every RGB picture before clipping; above 0.
     #[serde(default = "default_exposure")]
     pub exposure: f64,
 }
 
 /// Whether others have the files of a scene's source.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Availability {
     /// Anybody may have them, and can make the truth again.
     #[default]
     Public,
-    /// Nobody else has them.
+    /// Nobody else has them, so that the truth is a secret without `redress`.
     Private,
 }
 
 /// A real room: its scan, the cameras and photos that were taken of it, and the colours that were measured in it. Mesh
 /// and cameras share one world.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CapturedRoom {
-    /// A `.ply`, `.obj`, `.glb` or `.gltf` file.
+    /// The scan: a `.ply`, `.obj`, `.glb` or `.gltf` file.
     pub mesh: PathBuf,
-    /// A file or a folder of cameras.
+    /// The file or folder of the cameras: format/capture.md, "Cameras".
     pub cameras: PathBuf,
     /// The folder of the photos.
     pub photos: PathBuf,
     /// The name of the input photo, with or without its ending.
     pub input: String,
-    /// The names of photos of other views, with which renders of submissions are compared.
+    /// The names of photos of other views, with which renders of submissions are compared. They belong to the truth,
+    /// and no method sees them.
     #[serde(default)]
     pub novel: Vec<String>,
-    /// The measured colours: a file of ours, or a table of MAW's.
-    pub measured: PathBuf,
-    /// A NumPy file with the number of an instance for each triangle of the mesh.
+    /// The measured colours: a `.json` file, or with any other ending a table of MAW's; format/capture.md, "Measured
+    /// colours". If absent, the room is scored by its photos alone, and `novel` is required.
+    pub measured: Option<PathBuf>,
+    /// A NumPy file with an integer for each triangle of the mesh, the number of its instance; polygons are fans of
+    /// triangles. If absent, the instances are those that the mesh names, or its connected pieces.
     pub labels: Option<PathBuf>,
-    /// Metres for each unit of mesh and cameras.
+    /// Metres for each unit of mesh and cameras; above 0.
     #[serde(default = "default_scale")]
     pub scale: f64,
-    /// The direction up in the world of mesh and cameras.
+    /// The direction up in the world of mesh and cameras, `[0, 0, 1]` for most scans.
     #[serde(default = "default_up")]
     pub up: [f64; 3],
-    /// The names of the instances that belong to the building.
+    /// The names of the instances that belong to the building. `baseline delight` lets those glow whose name contains
+    /// `ceiling`.
     #[serde(default)]
     pub architecture: Vec<String>,
+    /// The number at which floating-point numbers of photos are clipped; integers are clipped at their largest one.
+    pub white: Option<f64>,
+    /// The exposures of photos, by their names in `input` and `novel`.
+    #[serde(default)]
+    pub exposures: BTreeMap<String, CameraExposure>,
+    /// Whether the exposures of all other photos are those that their EXIF data states.
+    #[serde(default)]
+    pub exif: bool,
+    /// A flash beside the camera.
+    pub flash: Option<CapturedFlash>,
+}
+
+/// A flash that was fixed beside the camera.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CapturedFlash {
+    /// Its place from each camera, in metres, at most 2 away: to the right, up, and back from what the camera looks at.
+    pub offset_m: [f64; 3],
+    /// Its radiant intensity, linear Rec. 709, in the unit of the input photo's radiance before exposure times square
+    /// metres. Fitted if absent.
+    pub intensity: Option<[f64; 3]>,
+    /// The photos that were taken with it, as `input` and `novel` name them; all if absent.
+    pub photos: Option<Vec<String>>,
+    /// Whether it was the only light of all photos.
+    #[serde(default)]
+    pub only_light: bool,
+}
+
+impl CapturedFlash {
+    /// Whether the photo of this name was taken with it.
+    fn lit(&self, photo: &str) -> bool {
+        self.photos.as_ref().is_none_or(|photos| photos.iter().any(|name| name == photo))
+    }
 }
 
 fn default_scale() -> f64 {
@@ -114,23 +162,75 @@ fn default_up() -> [f64; 3] {
 }
 
 impl CapturedRoom {
+    /// What `scene.json` states of the flash. `views` are those of the input photo and of the novel ones, in order.
+    pub(crate) fn flash_of(&self, views: &[View]) -> Option<Flash> {
+        let flash = self.flash.as_ref()?;
+        let &CapturedFlash { offset_m, intensity, only_light, .. } = flash;
+        let lit = self.photo_names().zip(views).filter(|(photo, _)| flash.lit(photo));
+        Some(Flash { offset_m, intensity, views: lit.map(|(_, view)| view.id.clone()).collect(), only_light })
+    }
+
+    /// The input photo and the novel ones.
+    fn photo_names(&self) -> impl Iterator<Item = &String> {
+        std::iter::once(&self.input).chain(&self.novel)
+    }
+
+    fn check_exposures(&self, faults: &mut Vec<RecipeSceneFault>) {
+        for (photo, exposure) in &self.exposures {
+            let key = format!("exposures.{photo}");
+            if !self.photo_names().any(|known| known == photo) {
+                let expected = "the name of a photo, as `input` and `novel` have it";
+                faults.push(ValueFault::new(key, exposure.to_string(), expected).into());
+            } else if !exposure.is_sound() {
+                let [time, iso, f] = CameraExposure::RANGES.map(|(least, most)| format!("{least} to {most}"));
+                let expected = format!("time_s of {time}, iso of {iso} and f_number of {f}");
+                faults.push(ValueFault::new(key, format!("{exposure:?}"), expected).into());
+            }
+        }
+        if !self.exif && !self.exposures.is_empty() && !self.exposures.contains_key(&self.input) {
+            let expected = "that of the input photo too, to which the others are brought";
+            faults.push(ValueFault::new("exposures", format!("{:?}", self.exposures.keys()), expected).into());
+        }
+    }
+
+    fn check_flash(&self, faults: &mut Vec<RecipeSceneFault>) {
+        let Some(flash) = &self.flash else { return };
+        let &CapturedFlash { offset_m, intensity, only_light, .. } = flash;
+        let fault = Flash { offset_m, intensity, views: Vec::new(), only_light }.fault();
+        if let Some((key, found, expected)) = fault {
+            faults.push(ValueFault::new(format!("flash.{key}"), found, expected).into());
+        }
+        if let Some(photos) = &flash.photos {
+            let is_known = |photo: &String| self.photo_names().any(|known| known == photo);
+            if photos.is_empty() || !photos.iter().all(is_known) {
+                let expected = "names of photos, as `input` and `novel` have them";
+                faults.push(ValueFault::new("flash.photos", format!("{photos:?}"), expected).into());
+            }
+        }
+        if only_light && !self.photo_names().all(|photo| flash.lit(photo)) {
+            let expected = "false, since photos that `photos` does not name have another light";
+            faults.push(ValueFault::new("flash.only_light", "true", expected).into());
+        }
+        if intensity.is_none() && !flash.lit(&self.input) {
+            let expected = "an intensity, since the input photo, to which it would be fitted, is without the flash";
+            faults.push(ValueFault::new("flash.intensity", "none", expected).into());
+        }
+    }
+
     /// Its paths with their keys, and whether each must be a folder.
     fn paths(&self) -> impl Iterator<Item = (&'static str, &Path, bool)> {
         // Of cameras, COLMAP and Objects With Lighting have a folder, all others a file with an ending.
         let has_ending = self.cameras.extension().is_some();
+        let measured = self.measured.as_deref().map(|measured| ("measured", measured, false));
         let labels = self.labels.as_deref().map(|labels| ("labels", labels, false));
-        let all: [(&'static str, &Path, bool); 4] = [
-            ("mesh", &self.mesh, false),
-            ("cameras", &self.cameras, !has_ending),
-            ("photos", &self.photos, true),
-            ("measured", &self.measured, false),
-        ];
-        all.into_iter().chain(labels)
+        let all: [(&'static str, &Path, bool); 3] =
+            [("mesh", &self.mesh, false), ("cameras", &self.cameras, !has_ending), ("photos", &self.photos, true)];
+        all.into_iter().chain(measured).chain(labels)
     }
 }
 
 /// What a scene is redressed with. Both paths must lead out of the folder that the recipe's paths are relative to.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Redress {
     /// A file of at least 32 random bytes.
@@ -140,33 +240,35 @@ pub struct Redress {
 }
 
 /// A room of a 3D-FRONT house, and the paths of everything that it needs.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front3dRoom {
+    /// The house's JSON, of any release.
     pub house: PathBuf,
-    /// The room's instanceid, as in `LivingDiningRoom-1912`.
+    /// The room's `instanceid`, as in `LivingDiningRoom-1912`.
     pub room: String,
-    /// The folder of 3D-FUTURE's models.
+    /// 3D-FUTURE's folder: `<jid>/raw_model.obj`, `<jid>/texture.png`, `model_info.json`.
     pub models: PathBuf,
-    /// The folder of the layout's textures; if absent, the architecture has colours only.
+    /// The folder of 3D-FRONT's textures, `<jid>/texture.png`; if absent, the architecture has colours only.
     pub textures: Option<PathBuf>,
-    /// A file of designers' cameras for the house.
+    /// A file of designers' cameras: by `<uid>_<number>.jpg` an object whose `camera` has `pos`, `target` and `fov`,
+    /// the vertical field of view in degrees. If absent, those in the house's JSON, which the last release has.
     pub cameras: Option<PathBuf>,
-    /// Mirror the layout as BlenderProc does.
+    /// Mirror the layout, and each piece of furniture back, as BlenderProc's loader does.
     #[serde(default)]
     pub blenderproc_compat: bool,
     /// Where roughness and metallic come from.
     #[serde(default)]
     pub appearance: AppearanceWord,
-    /// The seed of what [`AppearanceWord::Stated`] draws; 0 if absent.
+    /// The seed of the roughnesses that `appearance = "stated"` draws; 0 if absent.
     pub appearance_seed: Option<u64>,
 }
 
 /// The rule for the roughness and metallic of a 3D-FRONT room.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AppearanceWord {
-    /// 0.5 and 0 everywhere.
+    /// 0.5 and 0 everywhere, as in BlenderProc.
     #[default]
     Constant,
     /// By the class of material that the data states.
@@ -274,8 +376,9 @@ impl RecipeScene {
     pub(crate) fn recorded_paths(&mut self) -> Vec<(&'static str, &mut PathBuf)> {
         if let Some(room) = &mut self.capture {
             let files = [("mesh", &mut room.mesh), ("cameras", &mut room.cameras), ("photos", &mut room.photos)];
+            let measured = room.measured.as_mut().map(|measured| ("measured", measured));
             let labels = room.labels.as_mut().map(|labels| ("labels", labels));
-            return files.into_iter().chain([("measured", &mut room.measured)]).chain(labels).collect();
+            return files.into_iter().chain(measured).chain(labels).collect();
         }
         let Some(room) = &mut self.front3d else { return Vec::new() };
         let optional = [("textures", room.textures.as_mut()), ("cameras", room.cameras.as_mut())];
@@ -333,6 +436,17 @@ impl RecipeScene {
         if !(length > 1e-6 && length.is_finite()) {
             faults.push(ValueFault::new("up", format!("{:?}", room.up), "a direction, as in [0, 0, 1]").into());
         }
+        let is_white = |white: &f64| *white > 0.0 && white.is_finite();
+        if let Some(white) = room.white.filter(|white| !is_white(white)) {
+            faults.push(ValueFault::new("white", white.to_string(), "a number above 0").into());
+        }
+        if room.measured.is_none() && room.novel.is_empty() {
+            let expected =
+                "`measured`, or photos in `novel`; light is fitted to the input photo, which alone says little";
+            faults.push(ValueFault::new("measured", "none", expected).into());
+        }
+        room.check_exposures(faults);
+        room.check_flash(faults);
     }
 
     /// The scene has one source, and a camera that the source can provide.
@@ -395,8 +509,9 @@ impl RecipeScene {
 }
 
 /// The input camera of a scene.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "CameraWords")]
+#[schemars(with = "CameraWords")]
 pub enum RecipeCamera {
     /// Placed by hand.
     Given(GivenCamera),
@@ -422,13 +537,21 @@ pub struct GivenCamera {
 }
 
 /// A camera's keys as they are in the file.
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CameraWords {
+    /// The place of a camera that is set by hand, in metres.
+    #[schemars(inner(range(min = -FARTHEST_M, max = FARTHEST_M)))]
     position: Option<[f64; 3]>,
+    /// The point in the middle of its picture, in metres; the camera is level with respect to +Y.
+    #[schemars(inner(range(min = -FARTHEST_M, max = FARTHEST_M)))]
     target: Option<[f64; 3]>,
+    /// The vertical field of view of a camera that is set by hand or drawn, above 0 and below 179; if absent, for a
+    /// drawn one that of the `camera_rules`.
     fov_y_deg: Option<f64>,
+    /// Cameras are drawn in the room until one keeps the `camera_rules`. The same seed finds the same camera.
     seed: Option<u64>,
+    /// The number of a designer's camera, which keeps its field of view.
     designer: Option<usize>,
 }
 

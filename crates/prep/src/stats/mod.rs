@@ -385,6 +385,7 @@ mod tests {
             exposure: 1.0,
             photo: None,
             novel_photos: BTreeMap::new(),
+            flash: None,
             redressed: None,
             views: Vec::new(),
             instances: things.iter().enumerate().map(|(at, thing)| instance(at, thing)).collect(),

@@ -25,6 +25,7 @@ use mateval_files::FileError;
 use mateval_files::source_folder::{common_folder, relative_below, slashed};
 
 use crate::error::PrepError;
+use crate::recipe::Redress;
 use crate::redress::RedressKey;
 use house::{HouseName, HouseSearch, SurveyFolder};
 use output::merge;
@@ -52,8 +53,8 @@ pub struct Surveyed {
 pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<Surveyed, PrepError> {
     check_folders(options)?;
     let source = source_folder(options)?;
-    if let Some(key) = &options.redress {
-        RedressKey::open(key, None, &[&source, &options.out])?;
+    if let Some(Redress { key, materials }) = &options.redress {
+        RedressKey::open(key, materials.as_deref(), &[&source, &options.out])?;
     }
     let options = &relative_to(&source, options)?;
     let houses = house_files(options, &source)?;
@@ -123,14 +124,16 @@ fn relative_to(source: &Path, options: &SurveyOptions) -> Result<SurveyOptions, 
         models: relative(&options.models)?,
         textures: options.textures.as_ref().map(relative).transpose()?,
         cameras: options.cameras.as_ref().map(relative).transpose()?,
-        // The key lies outside of the source's folder.
-        redress: options
-            .redress
-            .as_ref()
-            .map(|key| key.canonicalize().map_err(FileError::io("find", key)))
-            .transpose()?,
+        // Key and materials lie outside of the source's folder.
+        redress: options.redress.as_ref().map(absolute).transpose()?,
         ..options.clone()
     })
+}
+
+fn absolute(redress: &Redress) -> Result<Redress, PrepError> {
+    let found = |path: &PathBuf| path.canonicalize().map_err(FileError::io("find", path));
+    let materials = redress.materials.as_ref().map(found).transpose()?;
+    Ok(Redress { key: found(&redress.key)?, materials })
 }
 
 /// The house files that were given, and all JSON files of the folders that were given: each once, sorted within its

@@ -21,7 +21,7 @@ use super::rules::SurveyOptions;
 use super::selection::{rank, select};
 use super::survey_file::{CandidateCamera, SURVEY, SURVEY_FORMAT, SurveyFile, SurveyedHouse};
 use crate::error::PrepError;
-use crate::recipe::RECIPE;
+use crate::recipe::{RECIPE, Redress};
 
 /// The name of the page in the survey's folder.
 const PAGE: &str = "index.html";
@@ -132,7 +132,10 @@ fn scene_text(options: &SurveyOptions, house: &str, room: &str, camera: &Candida
         }
     }
     let CandidateCamera { scene, position, target, fov_y_deg, origin, .. } = camera;
-    let redress = options.redress.as_ref().map(|key| format!("redress = {{ key = {} }}\n", shown(key)));
+    let redress = options.redress.as_ref().map(|Redress { key, materials }| {
+        let materials = materials.as_ref().map(|folder| format!(", materials = {}", shown(folder)));
+        format!("redress = {{ key = {}{} }}\n", shown(key), materials.unwrap_or_default())
+    });
     let redress = redress.unwrap_or_default();
     format!(
         "\n[[scene]]\nid = {}\nfront3d = {{ {keys} }}\n{redress}# {origin}\n\

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use mateval_files::untrusted::sha256_of_bytes;
 use mateval_sources::front3d::camera_rules::CameraRules;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::selection::SelectionGoal;
 use super::survey_file::{IntersectingPair, Rejection, SURVEY_FORMAT};
 use crate::error::PrepError;
-use crate::recipe::read_text;
+use crate::recipe::{Redress, read_text};
 
 #[derive(Clone, Debug)]
 pub struct SurveyOptions {
@@ -43,8 +44,9 @@ pub struct SurveyOptions {
     pub only: Vec<String>,
     /// The scenes to choose; every accepted room where absent.
     pub goal: Option<SelectionGoal>,
-    /// The key with which the recipe's scenes are redressed; they are not where absent.
-    pub redress: Option<PathBuf>,
+    /// What the recipe's scenes are redressed with; they are not where absent. Its paths are relative to the current
+    /// folder, not to the source's.
+    pub redress: Option<Redress>,
     pub out: PathBuf,
     /// Replace a survey that already exists.
     pub force: bool,
@@ -63,34 +65,35 @@ impl SurveyOptions {
     }
 }
 
-/// Conditions that a room must meet. Every key of the file is optional.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// The TOML file of the rules of a survey: conditions that a room must meet.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SelectionRules {
-    /// Accepted room types, as in `LivingDiningRoom`; any type where empty.
+    /// Accepted room types, as in `LivingDiningRoom`; any type if absent or empty.
     pub room_types: Vec<String>,
     /// Smallest number of pieces of furniture placed.
     pub min_objects: usize,
     /// Largest number of pieces of furniture placed.
     pub max_objects: usize,
+    /// Smallest number of super-categories that the furniture belongs to.
     pub min_super_categories: usize,
-    /// Longest sides of the bounding box of the floor, in metres.
+    /// Longest sides of the bounding box of the floor, along X and along Z.
     pub max_size_m: [f64; 2],
-    /// Largest number of pairs of pieces that intersect beyond either of the next two limits.
+    /// Largest number of pairs of pieces that intersect beyond `max_intersection_depth_m` or `max_intersection_volume`.
     pub max_intersecting: usize,
-    /// How deep a piece may stand in another, in metres: the shortest way that separates them.
+    /// How deep a piece may stand in another: the shortest way that separates them.
     pub max_intersection_depth_m: f64,
     /// How much of the smaller piece's volume may lie in the other, 0 to 1.
     pub max_intersection_volume: f64,
     /// Largest number of valid pieces whose model or texture is missing.
     pub max_missing: usize,
-    /// Largest share of the pixels of the five views that see the outside.
+    /// Largest share of the pixels of the five views that see the outside, 0 to 1.
     pub max_outside: f64,
     /// Smallest number of pieces that the input view sees.
     pub min_seen_objects: usize,
-    /// Smallest distance from the camera to a surface that any of the five views sees, in metres. Designers place
-    /// cameras close to objects, while drawn cameras keep a metre away; but some of the designers' cameras lie in the
-    /// plane of a wall, and half of such a picture is noise.
+    /// Smallest distance from the camera to a surface that any of the five views sees. Designers place cameras close to
+    /// objects, while drawn cameras keep a metre away; but some of the designers' cameras lie in the plane of a wall,
+    /// and half of such a picture is noise.
     pub min_nearest_m: f64,
 }
 

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use mateval_dataset::dataset::{DatasetFile, Photo, SceneFile};
-use mateval_dataset::layout::{INPUT, SCORER_JSON, SceneFolder};
+use mateval_dataset::dataset::{DatasetFile, Photo, PhotoEncoding, SceneFile};
+use mateval_dataset::layout::{INPUT, SCORER_JSON, SceneFolder, WHOLE_SCENE};
 use mateval_dataset::render_file::{RenderFile, SCORER_FORMAT, ScorerFile, light_inputs_sha256};
 use mateval_dataset::{Finding, RendererId, Severity, json};
 use mateval_files::untrusted::sha256_of_file;
@@ -89,10 +89,23 @@ pub(super) fn check_photos(folder: &SceneFolder, scene: &SceneFile, photo: &Phot
     let novel = novel.filter(|_| folder.truth().is_dir()).map(|(view, photo)| {
         (view, photo, format!("ground_truth/views/{}/photo.exr", view.id), format!("/novel_photos/{}", view.id))
     });
+    let is_split = folder.path().join(WHOLE_SCENE).exists();
     for (view, photo, file, place) in input.into_iter().chain(novel) {
-        if !scene.source.files.iter().any(|file| file.path == photo.file) {
+        // Where a dataset was split, the public scene lists no hash of a withheld photo, because it could be looked up.
+        let is_withheld = is_split && view.id.as_str() != INPUT;
+        if !is_withheld && !scene.source.files.iter().any(|file| file.path == photo.file) {
             let message = "expected one of the files in /source/files";
             faults.add("unlisted_photo", "scene.json", format!("{place}/file"), message);
+        }
+        let is_white = |white: f64| photo.encoding == PhotoEncoding::Linear && white > 0.0 && white.is_finite();
+        if photo.white.is_some_and(|white| !is_white(white)) {
+            let message = "expected a finite number above 0, and only of a photo of floating-point numbers";
+            faults.add("bad_white", "scene.json", format!("{place}/white"), message);
+        }
+        let is_relative = |ratio: f64| view.id.as_str() != INPUT && ratio > 0.0 && ratio.is_finite();
+        if photo.relative_exposure.is_some_and(|ratio| !is_relative(ratio)) {
+            let message = "expected a finite number above 0, and none of the input photo";
+            faults.add("bad_exposure", "scene.json", format!("{place}/relative_exposure"), message);
         }
         let Some(shown) = faults.read(&file, exr_io::read_linear(&folder.path().join(&file))) else { continue };
         let k = view.camera.intrinsics;

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::DMat3;
-use mateval_dataset::dataset::{FORMAT, Part, SceneFile, View, WideView};
+use mateval_dataset::dataset::{FORMAT, Flash, Part, SceneFile, View, WideView};
 use mateval_dataset::glb::GlbNode;
 use mateval_dataset::layout::{INPUT, SceneFolder};
 use mateval_dataset::material::{ColorInput, Material, MaterialModel};
@@ -95,6 +95,34 @@ fn check_views(scene: &SceneFile, faults: &mut Faults) {
     for view in scene.novel_photos.keys().filter(|id| scene.view(id.as_str()).is_none() || id.as_str() == INPUT) {
         let message = format!("the scene has no novel view '{view}'");
         faults.add("dangling_reference", SCENE_FILE, format!("/novel_photos/{view}"), message);
+    }
+    if let Some(flash) = &scene.flash {
+        check_flash(scene, flash, faults);
+    }
+}
+
+/// Checks that a flash is in range, and that the views that it lights have photos.
+fn check_flash(scene: &SceneFile, flash: &Flash, faults: &mut Faults) {
+    if scene.source.kind != SourceKind::Capture {
+        let message = "expected none, since only a captured room has a flash";
+        faults.add("unexpected_flash", SCENE_FILE, "/flash", message);
+    }
+    if let Some((key, found, expected)) = flash.fault() {
+        faults.add("bad_flash", SCENE_FILE, format!("/flash/{key}"), format!("found {found}, expected {expected}"));
+    }
+    let is_photo = |view: &ViewId| view.as_str() == INPUT || scene.novel_photos.contains_key(view);
+    for (at, view) in flash.views.iter().enumerate().filter(|(_, view)| !is_photo(view)) {
+        let message = format!("the scene has no photo of a view '{view}'");
+        faults.add("dangling_reference", SCENE_FILE, format!("/flash/views/{at}"), message);
+    }
+    let is_lit = |view: &ViewId| flash.views.contains(view);
+    if flash.only_light && !scene.views.iter().map(|view| &view.id).all(is_lit) {
+        let message = "the photos of some views are without the flash, and would be black";
+        faults.add("bad_flash", SCENE_FILE, "/flash/only_light", message);
+    }
+    if flash.intensity.is_none() && !flash.views.iter().any(|view| view.as_str() == INPUT) {
+        let message = "expected an intensity, since the input photo is without the flash";
+        faults.add("bad_flash", SCENE_FILE, "/flash/intensity", message);
     }
 }
 
@@ -221,12 +249,11 @@ pub(super) fn check_materials(folder: &SceneFolder, scene: &SceneFile, faults: &
 /// Checks the measured colours of a captured scene, and that each region of a view is one of the scene's.
 pub(super) fn check_measured(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
     const FILE: &str = "ground_truth/measured.json";
-    let (exists, is_captured) = (folder.measured().exists(), !scene.source.kind.states_materials());
-    if !exists || !is_captured {
-        if exists != is_captured {
-            let message = "a scene has this file if and only if it is captured";
-            faults.add("unexpected_measured", FILE, "", message);
-        }
+    if !folder.has_measured() {
+        return;
+    }
+    if scene.source.kind.states_materials() {
+        faults.add("unexpected_measured", FILE, "", "expected none, since only a captured scene has this file");
         return;
     }
     check_schema::<MeasuredFile>(folder.path(), FILE, faults);

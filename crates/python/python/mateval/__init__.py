@@ -11,14 +11,14 @@
 >>> mateval.score("OUT", dataset)["albedo.novel.psnr"]
 
 Arrays are NumPy's, in rows from the top left. Colours are linear Rec. 709 where they are floats and sRGB where they are
-integers. Lengths are metres, +Y is up.
+integers; channels are in the order RGB, not BGR as OpenCV reads and writes them. Lengths are metres, +Y is up.
 """
 
 from . import _core, metrics, torch
 from ._core import Camera, Delit, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, delight, lift, procedural
 from .by_id import ById
 from .dataset import Dataset, open
-from .errors import Error, UnknownId, Withheld
+from .errors import Error, UnknownId, Withheld, WrongShape
 from .reports import LintReport, Result, lint, rank, score, tables
 
 __version__ = _core.__version__
@@ -41,6 +41,7 @@ __all__ = [
     "UnknownId",
     "View",
     "Withheld",
+    "WrongShape",
     "delight",
     "lift",
     "lint",

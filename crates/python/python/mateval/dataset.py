@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Mapping
 from typing import Any, Union, overload
@@ -43,6 +44,11 @@ class Dataset(_core.Dataset, Mapping[str, _core.Scene]):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (os.path.abspath(self.path),)
 
+    def _repr_html_(self) -> str:
+        from . import display  # Only notebooks need it.
+
+        return display.dataset(self)
+
 
 #: A dataset, or the path of its folder.
 DatasetOrPath = Union[_core.Dataset, str, "os.PathLike[str]"]
@@ -55,9 +61,28 @@ def open(path: DatasetOrPath) -> Dataset:
 
 def reopened_scene(path: str, scene: str) -> _core.Scene:
     """The copy of a pickled scene."""
-    return Dataset(path)[scene]
+    return _reopened(path)[scene]
 
 
 def reopened_view(path: str, scene: str, view: str) -> _core.View:
     """The copy of a pickled view."""
-    return Dataset(path)[scene].views[view]
+    return _reopened(path)[scene].views[view]
+
+
+def reopened_instance(path: str, scene: str, instance: str) -> _core.Instance:
+    """The copy of a pickled instance."""
+    return _reopened(path)[scene].instances[instance]
+
+
+def _reopened(path: str) -> Dataset:
+    # A batch holds many copies from one dataset. It is opened for the first of them, and again once it has changed.
+    try:
+        changed = os.stat(os.path.join(path, "dataset.json")).st_mtime_ns
+    except OSError:
+        return Dataset(path)  # Its error names the folder.
+    return _opened_once(path, changed)
+
+
+@functools.lru_cache(maxsize=1)
+def _opened_once(path: str, changed: int) -> Dataset:
+    return Dataset(path)

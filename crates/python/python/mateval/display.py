@@ -1,4 +1,4 @@
-"""What notebooks show of scenes, views, maps and results: HTML with pictures and numbers."""
+"""What notebooks show of datasets, scenes, views, maps and results: HTML with pictures and numbers."""
 
 from __future__ import annotations
 
@@ -8,9 +8,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Optional
 
 from . import _core
+from .errors import Error, Withheld
 
 if TYPE_CHECKING:
+    from .dataset import Dataset
     from .reports import Result
+
+#: The number of scenes of a dataset that are shown.
+MOST_SCENES = 20
 
 #: The numbers that a result shows first.
 HEADLINES = (
@@ -34,21 +39,31 @@ def picture(array: Any, caption: str) -> str:
 
 class Pictures:
     """Pictures side by side, by their captions, as the last line of a notebook's cell: uint8 as it is, floats as linear
-    colours or, of shape (height, width), as numbers of 0 to 1."""
+    colours or, of shape (height, width), as numbers of 0 to 1, and booleans as black and white. Colours are RGB.
+
+    >>> view = mateval.open("DATASET")["room"].input
+    >>> mateval.display.Pictures({"depth": view.depth / view.depth.max(), "normal": view.normal / 2 + 0.5})
+    """
 
     def __init__(self, pictures: Mapping[str, Any]) -> None:
+        if not isinstance(pictures, Mapping):
+            raise TypeError(f"pictures: expected a dictionary by captions, found {type(pictures).__name__}")
         self.pictures = dict(pictures)
 
     def _repr_html_(self) -> str:
-        return "".join(picture(_bytes(array), caption) for caption, array in self.pictures.items())
+        return "".join(picture(_bytes(caption, array), caption) for caption, array in self.pictures.items())
 
 
-def _bytes(array: Any) -> Any:
+def _bytes(caption: str, array: Any) -> Any:
     import numpy as np  # `import mateval` does without.
 
-    array = np.asarray(array)
+    from .tensors import as_array
+
+    array = as_array(caption, array)
     if array.dtype == np.uint8:
         return array
+    if array.dtype != np.bool_ and not np.issubdtype(array.dtype, np.floating):
+        raise ValueError(f"{caption}: expected uint8, floats or booleans, found {array.dtype}; scale it to 0 to 1")
     return _core.srgb_bytes(array) if array.ndim == 3 else (np.clip(array, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
@@ -60,6 +75,43 @@ def view(view: _core.View) -> str:
         return picture(_core.srgb_bytes(view.truth.albedo), f"{view.id}: the true albedo")
     except Exception as reason:
         return f"<p>{html.escape(repr(view))}: {html.escape(str(reason))}</p>"
+
+
+def dataset(dataset: Dataset) -> str:
+    """A table of the first scenes: their views, and what distinguishes them."""
+    ids = list(dataset)
+    rows = "".join(_row("td", _scene_cells(dataset, id)) for id in ids[:MOST_SCENES])
+    left = [f"{len(ids) - MOST_SCENES} of the scenes"] if len(ids) > MOST_SCENES else []
+    if dataset.absent:
+        left.append(f"{len(dataset.absent)} that {'was' if len(dataset.absent) == 1 else 'were'} not downloaded")
+    renderer = f"; photos by {dataset.photo_renderer}" if dataset.photo_renderer else ""
+    text = f"version {dataset.version}, {len(ids)} {'scene' if len(ids) == 1 else 'scenes'}{renderer}"
+    head = f"<p><b>{html.escape(dataset.name)}</b>: {html.escape(text)}</p>"
+    table = f"<table>{_row('th', ('Scene', 'House', 'Views', 'Resolution', 'Marks'))}{rows}</table>"
+    return head + table + (f"<p>not shown: {html.escape('; '.join(left))}</p>" if left else "")
+
+
+def _scene_cells(dataset: Dataset, id: str) -> tuple[str, ...]:
+    scene = dataset[id]
+    width, height = scene.input.camera.size
+    marks = []
+    if id in dataset.twins:
+        marks.append("twin of {} in {}".format(*dataset.twins[id]))
+    if scene.photo is not None:
+        marks.append("photo from elsewhere")
+    if scene.redressed:
+        marks.append("redressed")
+    try:
+        _ = scene.input.truth
+    except Withheld:
+        marks.append("truth withheld")
+    except Error:
+        marks.append("captured, true materials unknown")
+    return id, scene.house, str(len(scene.views)), f"{width}x{height}", ", ".join(marks)
+
+
+def _row(tag: str, cells: tuple[str, ...]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
 def scene(scene: _core.Scene) -> str:

@@ -1,4 +1,4 @@
-"""The exceptions of this package. Wrong arguments are Python's own ``TypeError`` and ``ValueError``."""
+"""The exceptions of this package. All other wrong arguments raise Python's own ``TypeError`` or ``ValueError``."""
 
 
 class Error(Exception):
@@ -11,6 +11,10 @@ class UnknownId(Error, KeyError):
     def __str__(self) -> str:
         # KeyError would show the text in quotation marks.
         return Exception.__str__(self)
+
+
+class WrongShape(Error, ValueError):
+    """An array whose shape or size does not fit what it is compared with or made into."""
 
 
 class Withheld(Error):

@@ -34,6 +34,9 @@ def render(
         with _core.Submission(out, root, method="maps") as submission:
             for instance, found in maps.items():
                 is_mapping = isinstance(found, Mapping)
+                if not is_mapping and not isinstance(found, _core.Maps):
+                    expected = f"Maps or a dictionary of {', '.join(MAPS)}"
+                    raise TypeError(f"maps: {instance}: expected {expected}, found {type(found).__name__}")
                 unknown = [name for name in found if name not in MAPS] if is_mapping else []
                 if unknown:
                     raise ValueError(f"maps: {instance}: expected {', '.join(MAPS)}, found {', '.join(map(repr, unknown))}")

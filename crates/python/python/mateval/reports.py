@@ -70,8 +70,12 @@ class Result(Mapping[str, float]):
 
     def save(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
         """Writes ``RESULT.json``, which every command of ``mateval eval`` takes. ``force`` replaces a file."""
-        with open(path, "w" if force else "x", encoding="utf-8") as file:
-            file.write(self.json)
+        try:
+            with open(path, "w" if force else "x", encoding="utf-8") as file:
+                file.write(self.json)
+        except FileExistsError:
+            text = f"'{os.fspath(path)}' already exists; choose another path, or replace it with force=True"
+            raise FileExistsError(text) from None
 
     @property
     def method(self) -> str:
@@ -102,6 +106,12 @@ class Result(Mapping[str, float]):
     def constancy(self) -> dict[str, dict[str, Any]]:
         """By scene whose twins the submission answers, how far its answers lie apart: ``raw``, ``aligned``, ``mean_mse``..."""
         return {family["scene"]: family for family in self._file.get("constancy", [])}
+
+    @property
+    def measured(self) -> list[dict[str, Any]]:
+        """The regions of captured rooms whose colour was measured, as rows of a table: ``scene``, ``region``,
+        ``predicted``, ``measured``, ``delta_e``... Only ``capture-1`` has them."""
+        return list(self._protocol.get("measured", []))
 
     @property
     def missing(self) -> list[dict[str, Any]]:

@@ -8,10 +8,10 @@ from typing import Any
 
 from .dataset import Dataset, DatasetOrPath, open
 
-#: Every array of a view, of its camera and of its truth.
+#: Every array of a view, of its camera and of its truth, and the exposure of its scene.
 _FIELDS = (
     *("rgb", "preview", "depth", "normal", "instance", "part", "valid", "unobserved"),
-    *("camera.K", "camera.world_from_camera", "camera.opencv"),
+    *("camera.K", "camera.world_from_camera", "camera.opencv", "exposure"),
     *("truth.albedo", "truth.diffuse_albedo", "truth.roughness", "truth.metallic", "truth.specular_region", "truth.rgb"),
 )
 
@@ -19,11 +19,13 @@ _FIELDS = (
 class Views:
     """A map-style dataset for ``torch.utils.data.DataLoader``: one item a view, a dictionary of arrays.
 
-    ``dataset`` is a dataset or its folder. ``fields`` are names of ``View``'s arrays, or of others' as in
-    ``truth.albedo`` and ``camera.K``; ids of ``instance`` and ``part`` are uint16, which most of PyTorch's functions
-    take as int64 alone. ``views`` are the ids of the views that are taken from every scene; by default the input view
-    alone, since methods see no other photo. An item also holds the ids ``scene`` and ``view``. Pictures of different
-    scenes may differ in size: such batches need a ``collate_fn``.
+    ``dataset`` is a dataset or its folder. ``fields`` are ``rgb``, ``preview``, ``depth``, ``normal``, ``instance``,
+    ``part``, ``valid`` and ``unobserved`` of ``View``, with ids as int64; ``K``, ``world_from_camera`` and ``opencv`` of
+    its camera, as in ``camera.K``; ``albedo``, ``diffuse_albedo``, ``roughness``, ``metallic``, ``specular_region`` and
+    ``rgb`` of its truth, as in ``truth.albedo``; and ``exposure`` of its scene, by which ``rgb`` is multiplied to be what
+    ``preview`` shows. Colours are RGB. ``views`` are the ids of the views that are taken from every scene; by default the
+    input view alone, since methods see no other photo. An item also holds the ids ``scene`` and ``view``. Pictures of
+    different scenes may differ in size: such batches need a ``collate_fn``.
 
     >>> views = mateval.torch.Views("DATASET", fields=["rgb", "depth", "normal", "valid", "truth.albedo"])
     >>> for batch in torch.utils.data.DataLoader(views, batch_size=8, num_workers=4):
@@ -48,12 +50,14 @@ class Views:
     def __getitem__(self, index: int) -> dict[str, Any]:
         scene, id = self._places[operator.index(index)]
         view = self.dataset[scene].views[id]
-        return {"scene": scene, "view": id, **{field: operator.attrgetter(field)(view) for field in self.fields}}
+        values = {field: _value(self.dataset[scene], view, field) for field in self.fields}
+        return {"scene": scene, "view": id, **values}
 
 
 class Scenes:
     """The same with one item a scene: each field is an array of all its views, or of those named, in the order of their
-    ids in ``view``. The photo, ``rgb`` and ``preview``, exists for the input view alone and has no such axis.
+    ids in ``view``, which PyTorch collates to one list a view. The photo, ``rgb`` and ``preview``, exists for the input
+    view alone, and ``exposure`` is one for all views: these have no such axis.
 
     >>> scenes = mateval.torch.Scenes("DATASET", fields=["rgb", "depth"])
     >>> for batch in torch.utils.data.DataLoader(scenes, batch_size=2):
@@ -84,10 +88,18 @@ class Scenes:
         ids = list(scene.views) if self.views is None else list(self.views)
         item: dict[str, Any] = {"scene": scene.id, "view": ids}
         for field in self.fields:
-            get = operator.attrgetter(field)
-            is_photo = field in ("rgb", "preview")
-            item[field] = get(scene.input) if is_photo else np.stack([get(scene.views[id]) for id in ids])
+            is_of_scene = field in ("rgb", "preview", "exposure")
+            values = [_value(scene, scene.views[id], field) for id in ids if not is_of_scene]
+            item[field] = _value(scene, scene.input, field) if is_of_scene else np.stack(values)
         return item
+
+
+def _value(scene: Any, view: Any, field: str) -> Any:
+    if field == "exposure":
+        return scene.exposure
+    value = operator.attrgetter(field)(view)
+    # PyTorch converts no uint16 before version 2.3, and few of its functions take one.
+    return value.astype("int64") if field in ("instance", "part") else value
 
 
 def _fields(given: Iterable[str]) -> tuple[str, ...]:

@@ -87,7 +87,7 @@ impl<'a> Board<'a> {
 
     /// Whether the scene can be shown in 3D with the textures of a method.
     pub(super) fn has_room(&self, scene: &SceneId, method: &str) -> bool {
-        matches!(self.rooms.get(scene), Some(Room::Shown { methods }) if methods.iter().any(|id| id == method))
+        matches!(self.rooms.get(scene), Some(Room::Shown { methods, .. }) if methods.iter().any(|id| id == method))
     }
 
     /// The indices of the methods in [`Self::heads`], the best first by the column that the board is sorted by

@@ -1,11 +1,13 @@
-//! The board itself: one row for each method, one column for each number and each fact; and the same numbers as files.
+//! The board itself: one row for each method, one column for each number and each fact; and the same numbers as files,
+//! also for the Hugging Face Hub.
 
 use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_dataset::{SceneId, json};
-use mateval_eval::result::key::ResultKey;
+use mateval_eval::metric::{Metric, PictureKind};
+use mateval_eval::result::key::{ResultKey, Views};
 use mateval_eval::result::{ProtocolResult, ResultFile, TracerCheck};
 use minijinja::context;
 use minijinja::value::Serde;
@@ -15,6 +17,7 @@ use super::board::{Board, Comparison, comparisons};
 use super::columns::{
     Cell, Choices, Column, FACTS, Fact, FactColumn, MethodHead, choices, facts, rank_text, shown, standing,
 };
+use super::entries::Hub;
 use super::file::{LEADERBOARD_PATH, LeaderboardFile};
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
@@ -265,6 +268,51 @@ pub(super) fn write_downloads(board: &Board<'_>, protocol: &str, site: &SiteWrit
     }
     for (head, scores) in board.heads.iter().zip(&board.scores) {
         site.file(&format!("methods/{}.csv", head.id), &scenes_csv(scenes, scores))?;
+    }
+    Ok(())
+}
+
+/// The task of `eval.yaml` in a dataset on the Hub.
+const HUB_TASK: ResultKey = ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Psnr);
+
+/// Writes `README.md`, which makes the site a static Space, and for each method a file for the folder `.eval_results`
+/// of its model (<https://huggingface.co/docs/hub/eval-results>). That file has a single number, so its notes state the
+/// protocol, the fingerprint, the verification and the interval. Methods made from the ground truth or from perturbed
+/// geometry, or ranked on some scenes alone, have none. Texts are written as JSON strings, which YAML reads as they
+/// are.
+pub(super) fn write_hub(board: &Board<'_>, hub: &Hub, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let quoted = |text: &str| serde_json::Value::from(text).to_string();
+    let (dataset, title) = (quoted(&hub.dataset), quoted(site.title()));
+    let front = format!("title: {title}\nsdk: static\napp_file: index.html\nlicense: other\ndatasets:\n- {dataset}\n");
+    site.file("README.md", &format!("---\n{front}---\n"))?;
+    let ranking = board.ranking();
+    let task = HUB_TASK.to_string().replace('.', "_");
+    let style = &HUB_TASK.metric.row().style;
+    for ((ranked, method), result) in ranking.methods.iter().zip(&board.file.methods).zip(board.results) {
+        let Some(standing) = standing(ranking, HUB_TASK, &ranked.id) else { continue };
+        if method.oracle || ranked.partial || result.submission.geometry.is_some() {
+            continue;
+        }
+        let page = format!("{}/methods/{}.html", hub.url.trim_end_matches('/'), ranked.id);
+        let percent = 100.0 * ranking.rules.confidence;
+        let interval = standing.interval.map_or_else(
+            || "no interval".to_owned(),
+            |interval| format!("{percent:.0} % interval {} to {}", style.text(interval.low), style.text(interval.high)),
+        );
+        let notes = format!(
+            "protocol {}, fingerprint {}; {}; {interval}, houses: {}",
+            ranking.protocol,
+            ranking.fingerprint,
+            word(&method.verified),
+            standing.houses
+        );
+        let text = format!(
+            "- dataset: {{id: {dataset}, task_id: {task}}}\n  value: {}\n  source: {{url: {}, name: {title}}}\n  notes: {}\n",
+            style.text(standing.value),
+            quoted(&page),
+            quoted(&notes)
+        );
+        site.file(&format!("downloads/eval_results/{}.yaml", ranked.id), &text)?;
     }
     Ok(())
 }

@@ -85,6 +85,8 @@ fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
         }
         // Beside the headline, in which a wrong tint hides how much of the texture a method has right.
         PictureKind::AlbedoAligned => views == Views::Novel,
+        // The first headline number of captured rooms.
+        PictureKind::Measured => return metric == Metric::RegionDeltaE,
         _ => false,
     };
     is_first && metric == Metric::Psnr && picture.surfaces == Surfaces::All
@@ -111,10 +113,13 @@ pub(super) fn first<'a>(columns: &'a [Column], headline: &[ResultKey]) -> Option
     known.or_else(|| columns.iter().find(|column| column.is_shown))
 }
 
-/// The columns that pages of scenes and methods show: PSNR on all surfaces, for each picture and views.
+/// The columns that pages of scenes and methods show: PSNR on all surfaces, for each picture and views, and every
+/// number of measured colours.
 pub(super) fn headlines(columns: &[Column]) -> Vec<&Column> {
-    let is_headline =
-        |column: &&Column| column.key.metric == Metric::Psnr && column.key.picture.surfaces == Surfaces::All;
+    let is_headline = |column: &&Column| {
+        let ResultKey { picture, metric, .. } = column.key;
+        picture.kind == PictureKind::Measured || (metric == Metric::Psnr && picture.surfaces == Surfaces::All)
+    };
     columns.iter().filter(is_headline).collect()
 }
 

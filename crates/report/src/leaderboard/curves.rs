@@ -29,7 +29,7 @@ const SIZE: [f64; 2] = [320.0, 180.0];
 const MARGIN: [f64; 2] = [28.0, 16.0];
 /// The width and height of a point's label.
 const LABEL: [f64; 2] = [12.0, 8.0];
-/// The right end of the axis of accuracy: the truth's own value, of 60 dB and more, would press the methods into a corner.
+/// The right end of the axis of accuracy: the truth's own value, 60 dB and more, would press the methods into a corner.
 const MOST_ACCURATE_DB: f64 = 40.0;
 
 pub(super) fn has_wide_views(board: &Board<'_>) -> bool {

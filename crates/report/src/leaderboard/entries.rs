@@ -127,7 +127,7 @@ pub struct Entries {
     /// The result of the truth.
     pub ceiling: Option<ResultFile>,
     pub errata: Option<ErrataFile>,
-    /// Markdown about the board.
+    /// Markdown about the board; absent where its file has no text.
     pub about: Option<String>,
 }
 
@@ -158,7 +158,9 @@ pub fn read(files: &ResultsFolder, trust: &TrustedKeys) -> Result<Entries, Repor
     }
     if let Some(path) = &files.about {
         let bytes = read_at_most(path, MOST_ABOUT_BYTES).map_err(FileError::io("read", path))?;
-        entries.about = Some(String::from_utf8_lossy(&bytes).into_owned());
+        let is_no_text = |_| std::io::Error::other("it is no UTF-8 text; save it as UTF-8");
+        let text = String::from_utf8(bytes).map_err(is_no_text).map_err(FileError::io("read", path))?;
+        entries.about = Some(text).filter(|text| !text.trim().is_empty());
     }
     let results = &entries.results;
     let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
@@ -209,7 +211,19 @@ pub struct LeaderboardPlan<'a> {
     pub votes: bool,
     /// Results on the original rooms, where the board's own are redressed: the site shows how far methods fall.
     pub original: Option<&'a [ResultFile]>,
+    /// Where the board is published on the Hugging Face Hub, if it is.
+    pub hub: Option<Hub>,
     pub tool: String,
+}
+
+/// A board on the Hugging Face Hub.
+#[derive(Clone, Debug)]
+pub struct Hub {
+    /// The repository of the board's dataset, as in `NAME/dataset`; its `eval.yaml`, which
+    /// `prep export --as huggingface` writes, defines the task.
+    pub dataset: String,
+    /// The address of the folder of the site.
+    pub url: String,
 }
 
 /// Submissions whose pictures are drawn.

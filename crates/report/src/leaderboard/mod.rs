@@ -29,10 +29,11 @@ use std::path::Path;
 
 use mateval_dataset::dataset::Secrecy;
 use mateval_dataset::{Progress, Report};
+use mateval_eval::protocol::Protocol;
 use mateval_files::work_folder::{WorkFolder, check_free};
 
 use self::board::Board;
-pub use self::entries::{LeaderboardPlan, Submissions};
+pub use self::entries::{Hub, LeaderboardPlan, Submissions};
 use self::file::LEADERBOARD_PATH;
 pub use self::pictures::{check_may_be_shown, keep_seen};
 use self::site::{CONSTANCY, CONTAMINATION, PAGES, PERTURBED, ROBUSTNESS, Site, SiteWriter, VOTES, WIDE_VIEWS};
@@ -58,6 +59,9 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     let site = SiteWriter::new(work.path(), site(&board, plan));
     site.assets()?;
     board_page::write_downloads(&board, plan.protocol, &site)?;
+    if let Some(hub) = &plan.hub {
+        board_page::write_hub(&board, hub, &site)?;
+    }
     board_page::write(&board, &site)?;
     let pages = board.heads.len() + board.ranking().scenes.len();
     for at in 0..board.heads.len() {
@@ -98,6 +102,11 @@ fn site(board: &Board<'_>, plan: &LeaderboardPlan<'_>) -> Site {
         title: format!("{} {} leaderboard", dataset.name, dataset.version),
         tool: board.file.tool.clone(),
         protocol: ranking.protocol.clone(),
+        captured: board.scores.iter().any(|scores| scores.protocol.measured.is_some()),
+        protocol_words: match ranking.protocol.as_str() {
+            Protocol::DEFAULT => String::new(),
+            other => format!(" --protocol {other}"),
+        },
         fingerprint: ranking.fingerprint.clone(),
         scenes: ranking.scenes.len(),
         houses: ranking.houses.values().collect::<BTreeSet<_>>().len(),
@@ -123,8 +132,8 @@ mod tests {
     use mateval_dataset::submission::Cost;
     use mateval_dataset::{SceneId, json};
     use mateval_eval::protocol::SCORER_VERSION;
-    use mateval_eval::result::{Constancy, Deviation};
-    use mateval_eval::result::{ResultFile, TracerCheck};
+    use mateval_eval::result::key::ResultKey;
+    use mateval_eval::result::{Constancy, Deviation, MeasuredValues, ResultFile, TracerCheck};
     use mateval_image::{Picture, png_io};
 
     use super::file::LeaderboardFile;
@@ -154,6 +163,7 @@ mod tests {
             submissions: None,
             votes: false,
             original: None,
+            hub: None,
             tool: "mateval".to_owned(),
         }
     }
@@ -286,6 +296,54 @@ mod tests {
         assert!(index.contains("constancy.html") && tables.contains("Constancy"), "{tables}");
     }
 
+    /// The pages of captured rooms list the measured regions with the answers of all methods. The twin has no regions.
+    #[test]
+    fn measured_regions_are_listed_with_the_answers() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut results = three();
+        let key: ResultKey = "measured.input.region_delta_e".parse().unwrap();
+        for (result, predicted) in results.iter_mut().zip([1.0, 0.5, 0.0]) {
+            let scene = result.dataset.scenes[0].clone();
+            let scores = result.protocols.get_mut("mateval-3").unwrap();
+            for (at, values) in scores.scenes.values_mut().enumerate() {
+                values.insert(key, 10.0 + at as f64);
+            }
+            scores.summary.insert(key, 15.5);
+            scores.measured = vec![MeasuredValues {
+                scene,
+                view: mateval_dataset::ViewId::new("input").unwrap(),
+                region: "left <wall>".to_owned(),
+                pixels: 321,
+                predicted: [predicted, 0.0, 0.0],
+                measured: [0.0, 1.0, 2.0],
+                delta_e: 12.3456,
+                measurement_delta_e: Some(0.75),
+            }];
+        }
+        // A method that was not scored on the scene.
+        results[2].protocols.get_mut("mateval-3").unwrap().measured.clear();
+        let out = folder.path().join("site");
+        write(&plan(&results), &out, false, &quiet).unwrap();
+        let text = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+        let page = text("scenes/s00.html");
+        let table = &page[page.find(">Measured colours</h2>").unwrap()..page.find("<h2>Scores</h2>").unwrap()];
+        // In linear light 1 is #ff, 0.5 is #bc, and more than 1 is shown as 1.
+        for words in ["left &lt;wall&gt;", "321", "0.750", "fill=\"#00ffff\"", "fill=\"#ff0000\"", "fill=\"#bc0000\""] {
+            assert_eq!(
+                table.matches(&format!(">{words}<")).count() + table.matches(&format!(" {words}/>")).count(),
+                1,
+                "{words}: {table}"
+            );
+        }
+        assert_eq!(table.matches("12.346 #").count(), 2, "{table}");
+        assert!(page.contains("there are no pictures of them"));
+        assert!(!text("scenes/s01.html").contains("Measured colours</h2>"));
+        // The number is a headline, on the pages of scenes and methods and on the board.
+        let head = "Measured colours, input view <b>CIEDE2000</b>";
+        assert!(page.contains(head) && text("methods/good.html").contains(head));
+        assert!(text("index.html").contains("Measured colours, input view"));
+    }
+
     /// The results of methods with these PSNR of albedo in novel views, raw and aligned, on the dataset with this
     /// manifest; scenes differ by up to 2 dB.
     fn redressed(manifest: &str, methods: &[(&str, [f64; 2])]) -> Vec<ResultFile> {
@@ -409,6 +467,56 @@ mod tests {
         let plan = LeaderboardPlan { ceiling: Some(&other), ..plan(&results) };
         let error = write(&plan, &out, true, &quiet).unwrap_err().to_string();
         assert!(error.contains("'good' and 'gt' were scored on different scenes"), "{error}");
+    }
+
+    /// A board whose keeper says nothing asks for what is missing by name.
+    #[test]
+    fn the_page_about_shows_what_the_keeper_says_or_asks_for_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = three();
+        let out = folder.path().join("site");
+        let page = |about: Option<&str>| {
+            let verified = vec![Verified::Confirmed, Verified::Refuted, Verified::Stale];
+            write(&LeaderboardPlan { about, verified, ..plan(&results) }, &out, true, &quiet).unwrap();
+            std::fs::read_to_string(out.join("about.html")).unwrap()
+        };
+        let asks = "states no contact, licence, paper or date";
+        let (said, silent) = (page(Some("Send it to *us*.")), page(None));
+        assert!(said.contains("Send it to <em>us</em>.") && !said.contains(asks), "{said}");
+        assert!(silent.contains(asks), "{silent}");
+        for state in ["1 result is verified", "1 result is claimed", "1 result is refuted"] {
+            assert!(said.contains(state), "{said}");
+        }
+    }
+
+    /// The names are JSON strings, which YAML reads as they are. The twin is not on the Hub.
+    #[test]
+    fn a_board_on_the_hub_is_a_space_and_states_a_result_of_each_method() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut results = redressed("m", &[("good", [30.0; 2]), ("fine", [25.0; 2]), ("gt", [48.0; 2])]);
+        results[2].submission.oracle = true;
+        let out = folder.path().join("site");
+        let hub = Hub { dataset: "NAME/rooms".to_owned(), url: "https://example.org/board/".to_owned() };
+        write(&LeaderboardPlan { hub: Some(hub), ..plan(&results) }, &out, false, &quiet).unwrap();
+        let text = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+        let front = "---\ntitle: \"d 1 leaderboard\"\nsdk: static\napp_file: index.html\nlicense: other\ndatasets:\n- \
+                     \"NAME/rooms\"\n---\n";
+        assert_eq!(text("README.md"), front);
+        let file: LeaderboardFile = json::read(&out.join(LEADERBOARD_PATH)).unwrap();
+        let interval = file.ranking.keys[&robustness::FALLS[0]].standings[0].interval.unwrap();
+        // The scenes differ by 0, 1 and 2 dB.
+        let expected = format!(
+            "- dataset: {{id: \"NAME/rooms\", task_id: albedo_novel_psnr}}\n  value: 31.00\n  source: {{url: \
+             \"https://example.org/board/methods/good.html\", name: \"d 1 leaderboard\"}}\n  notes: \"protocol mateval-3, \
+             fingerprint {}; confirmed; 95 % interval {:.2} to {:.2}, houses: 12\"\n",
+            file.ranking.fingerprint, interval.low, interval.high
+        );
+        assert_eq!(text("downloads/eval_results/good.yaml"), expected);
+        assert!(text("downloads/eval_results/fine.yaml").contains("; claimed; "));
+        // What was made from the ground truth is no method.
+        assert_eq!(std::fs::read_dir(out.join("downloads/eval_results")).unwrap().count(), 2);
+        write(&plan(&results), &out, true, &quiet).unwrap();
+        assert!(!out.join("README.md").exists() && !out.join("downloads/eval_results").exists());
     }
 
     /// The check that speaks most against the tracer is stated, and its absence.

@@ -1,6 +1,8 @@
 //! The pages that explain the others: about the board, the protocol, and errata.
 
 use mateval_dataset::dataset::DatasetVersion;
+use mateval_dataset::ids::counted;
+use mateval_dataset::open::Dataset;
 use mateval_eval::protocol::Protocol;
 use minijinja::context;
 use minijinja::value::Serde;
@@ -43,8 +45,19 @@ fn write_about(board: &Board<'_>, plan: &LeaderboardPlan<'_>, site: &SiteWriter<
         values: context! {
             said, dataset => Serde(&board.file.dataset),
             verified => count(Verified::Confirmed), claimed => count(Verified::Claimed) + count(Verified::Stale),
+            refuted => count(Verified::Refuted),
+            licences => plan.submissions.as_ref().map(|given| licences(given.dataset)),
         },
     })
+}
+
+/// The first line of each licence of a dataset with the number of its scenes, and the scenes without one.
+fn licences(dataset: &Dataset) -> Vec<String> {
+    let stated = dataset.file.shared_licences().into_iter().map(|licence| {
+        let first = licence.text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
+        format!("{first} ({})", counted(licence.scenes.len(), "scene"))
+    });
+    stated.chain(dataset.unstated_licences()).collect()
 }
 
 /// Markdown without what a script could hide in: the text may come with a pull request. HTML is shown as text,

@@ -44,8 +44,12 @@ const QUALITY: u8 = 90;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Room {
-    /// It is shown with the atlases of the truth and of these methods, which were scored on it.
-    Shown { methods: Vec<String> },
+    /// It is shown with the atlases of these methods, which were scored on it, and of the truth.
+    Shown {
+        methods: Vec<String>,
+        /// Not of a captured room, whose true materials nobody knows.
+        has_truth: bool,
+    },
     /// Its geometry is larger than a page shows.
     TooLarge {
         /// The size of its geometry in MiB, rounded up.
@@ -55,7 +59,7 @@ pub(super) enum Room {
     },
 }
 
-/// The rooms of the scenes; empty if no dataset and submission were given.
+/// The rooms of the scenes for which there are atlases to show; empty if no dataset and submission were given.
 pub(super) type Rooms = BTreeMap<SceneId, Room>;
 
 /// Writes the scripts of all ranked scenes to `folder`; writes nothing if no submission was given.
@@ -71,7 +75,8 @@ pub(super) fn write(
     let scenes = from.ranked_scenes(ranking);
     for (done, scene) in scenes.iter().enumerate() {
         progress(Report::step("rooms", done, scenes.len()));
-        rooms.insert(scene.id.clone(), write_room(from, named, scene, &folder.join(scene.id.as_str()))?);
+        let room = write_room(from, named, scene, &folder.join(scene.id.as_str()))?;
+        rooms.extend(room.map(|room| (scene.id.clone(), room)));
     }
     Ok(rooms)
 }
@@ -81,22 +86,28 @@ fn write_room(
     named: &[NamedSubmission<'_>],
     scene: &SceneFile,
     folder: &Path,
-) -> Result<Room, ReportError> {
+) -> Result<Option<Room>, ReportError> {
+    let shown: Vec<_> = named.iter().filter(|submission| submission.covers(&scene.id)).collect();
+    let has_truth = scene.source.kind.states_materials();
+    if shown.is_empty() && !has_truth {
+        return Ok(None);
+    }
     let geometry = from.dataset.folder(&scene.id).instances();
     let io = |source| FileError::io("read", &geometry)(source);
     let bytes = std::fs::metadata(&geometry).map_err(io)?.len();
     if bytes > MOST_GEOMETRY_BYTES {
         let [mebibytes, most_mebibytes] = [bytes, MOST_GEOMETRY_BYTES].map(|bytes| bytes.div_ceil(1 << 20));
-        return Ok(Room::TooLarge { mebibytes, most_mebibytes });
+        return Ok(Some(Room::TooLarge { mebibytes, most_mebibytes }));
     }
     make_folder(folder)?;
     let script = |name: &str, text: String| write_whole(&folder.join(format!("{name}.js")), text.as_bytes());
     let glb = base64::encode(read_at_most(&geometry, MOST_GEOMETRY_BYTES).map_err(io)?);
     let camera = scene.view(INPUT).map(|view| &view.camera);
     script(GEOMETRY, format!("roomGeometry({});\n", json!({ "glb": glb, "camera": camera })))?;
-    script(TRUTH, materials_script(TRUTH, &truth(from, scene)?))?;
+    if has_truth {
+        script(TRUTH, materials_script(TRUTH, &truth(from, scene)?))?;
+    }
     let atlases = AtlasMeshes::on_demand(from.dataset, scene);
-    let shown: Vec<_> = named.iter().filter(|submission| submission.covers(&scene.id)).collect();
     for submission in &shown {
         let prediction = read_scene(submission.folder, scene, &atlases)?;
         let materials = scene.instances.iter().zip(&prediction.materials);
@@ -106,7 +117,8 @@ fn write_room(
         });
         script(&submission.id, materials_script(&submission.id, &maps.collect()))?;
     }
-    Ok(Room::Shown { methods: shown.iter().map(|submission| submission.id.clone()).collect() })
+    let methods = shown.iter().map(|submission| submission.id.clone()).collect();
+    Ok(Some(Room::Shown { methods, has_truth }))
 }
 
 /// The truth's maps, by instance.

@@ -1,5 +1,6 @@
-//! The pages of a scene: all methods side by side in all views, the slider between prediction and truth, and scores;
-//! and its room in 3D, for which `rooms` writes the scripts.
+//! The pages of a scene. The first shows all methods side by side in all views, the slider between prediction and
+//! truth, and scores, and for a captured room the measured colours beside those of the methods. The second shows the
+//! room in 3D; `rooms` writes its scripts.
 
 use std::collections::BTreeSet;
 use std::io::Read as _;
@@ -7,7 +8,9 @@ use std::io::Read as _;
 use flate2::read::GzDecoder;
 use mateval_dataset::SceneId;
 use mateval_dataset::layout::INPUT;
-use mateval_eval::metric::PictureKind;
+use mateval_eval::metric::{Metric, PictureKind};
+use mateval_eval::result::MeasuredValues;
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
@@ -37,6 +40,7 @@ struct ScenePage<'a> {
     white_error: f32,
     columns: Vec<&'a Column>,
     rows: Vec<ScoreRow<'a>>,
+    regions: Vec<RegionRow<'a>>,
 }
 
 /// The slider of one kind of picture.
@@ -68,6 +72,24 @@ struct GalleryCell<'a> {
 struct ScoreRow<'a> {
     method: &'a MethodHead,
     cells: Vec<Option<String>>,
+}
+
+/// A region of a captured room whose colour was measured.
+#[derive(Serialize)]
+struct RegionRow<'a> {
+    name: &'a str,
+    pixels: usize,
+    color: String,
+    /// How far the measurement itself may be off, as CIEDE2000.
+    error: Option<String>,
+    /// In the order of the scores' rows.
+    answers: Vec<Option<RegionAnswer>>,
+}
+
+#[derive(Serialize)]
+struct RegionAnswer {
+    color: String,
+    delta_e: String,
 }
 
 /// An entry in the list of scenes.
@@ -112,6 +134,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
         height,
         white_error: WHITE_ERROR,
         rows: score_rows(board, scene, &columns),
+        regions: region_rows(board, scene),
         columns,
     };
     site.page(&Page {
@@ -202,6 +225,37 @@ fn score_rows<'a>(board: &'a Board<'_>, scene: &SceneId, columns: &[&Column]) ->
     board.best_first().into_iter().map(row).collect()
 }
 
+/// The measured regions of a scene in the order of the dataset, with the answers of the methods, the best first.
+fn region_rows<'a>(board: &'a Board<'_>, scene: &SceneId) -> Vec<RegionRow<'a>> {
+    let regions_of = |at: usize| -> Vec<&'a MeasuredValues> {
+        board.scores[at].measured.iter().filter(|region| region.scene == *scene).collect()
+    };
+    let methods: Vec<Vec<&MeasuredValues>> = board.best_first().into_iter().map(regions_of).collect();
+    // Every result lists the same regions; a method that was not scored on the scene lists none.
+    let Some(listed) = methods.iter().find(|regions| !regions.is_empty()) else { return Vec::new() };
+    let text = |delta_e: f64| Metric::RegionDeltaE.style().text(delta_e);
+    let row = |(at, region): (usize, &&'a MeasuredValues)| {
+        let answer = |regions: &Vec<&MeasuredValues>| {
+            let own = regions.get(at).filter(|own| own.region == region.region)?;
+            Some(RegionAnswer { color: shown_color(own.predicted), delta_e: text(own.delta_e) })
+        };
+        RegionRow {
+            name: &region.region,
+            pixels: region.pixels,
+            color: shown_color(region.measured),
+            error: region.measurement_delta_e.map(text),
+            answers: methods.iter().map(answer).collect(),
+        }
+    };
+    listed.iter().enumerate().map(row).collect()
+}
+
+/// A linear colour as a screen shows it, as in `#808080`.
+fn shown_color(linear: [f64; 3]) -> String {
+    let [r, g, b] = linear.map(|value| byte_from_unit(srgb_from_linear(value as f32)));
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
 /// The best method by the score that the board is sorted by initially, with that score.
 fn best(board: &Board<'_>, scene: &SceneId) -> Option<String> {
     let column = board.first()?;
@@ -216,16 +270,17 @@ fn best(board: &Board<'_>, scene: &SceneId) -> Option<String> {
 struct RoomPage<'a> {
     scene: &'a str,
     methods: Vec<&'a MethodHead>,
+    has_truth: bool,
     most_texels: usize,
 }
 
 /// Writes `rooms/<scene>.html` of each room that can be shown, and the script that shows it.
 pub(super) fn write_rooms(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     for (scene, room) in &board.rooms {
-        let Room::Shown { methods: ids } = room else { continue };
+        let Room::Shown { methods: ids, has_truth } = room else { continue };
         let methods =
             board.best_first().into_iter().map(|at| &board.heads[at]).filter(|head| ids.contains(&head.id)).collect();
-        let page = RoomPage { scene: scene.as_str(), methods, most_texels: MOST_TEXELS };
+        let page = RoomPage { scene: scene.as_str(), methods, has_truth: *has_truth, most_texels: MOST_TEXELS };
         site.page(&Page {
             file: &format!("rooms/{scene}.html"),
             template: "room.j2",

@@ -46,6 +46,10 @@ pub(super) struct Site {
     pub(super) title: String,
     pub(super) tool: String,
     pub(super) protocol: String,
+    /// Whether the protocol scores captured rooms.
+    pub(super) captured: bool,
+    /// What `eval score` needs besides the dataset; empty for the protocol that it uses by default.
+    pub(super) protocol_words: String,
     pub(super) fingerprint: String,
     pub(super) scenes: usize,
     pub(super) houses: usize,
@@ -136,6 +140,10 @@ impl<'a> SiteWriter<'a> {
             make_folder(folder)?;
         }
         Ok(write_whole(&path, text.as_bytes())?)
+    }
+
+    pub(super) fn title(&self) -> &str {
+        &self.site.title
     }
 
     pub(super) fn path(&self, file: &str) -> PathBuf {

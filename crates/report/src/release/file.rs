@@ -92,7 +92,10 @@ impl Evaluated {
         Ok(Self {
             original_view: targets.iter().any(|target| is_input(&target)),
             novel_view: !targets.iter().all(|target| is_input(&target)),
-            albedo: !targets.is_empty() && targets.iter().all(albedo),
+            // Of a captured room these pictures are placeholders.
+            albedo: !targets.is_empty()
+                && targets.iter().all(albedo)
+                && dataset.scenes.iter().all(|scene| scene.source.kind.states_materials()),
         })
     }
 }
@@ -160,6 +163,12 @@ impl ReleaseFile {
     /// given agrees.
     pub fn is_good(&self) -> bool {
         self.verification.sound && self.comparisons().all(|verdict| verdict.agrees)
+    }
+
+    /// Whether all scenes are captured rooms, which protocol `capture-1` scores.
+    pub fn is_captured(&self) -> bool {
+        !self.stats.per_scene.is_empty()
+            && self.stats.per_scene.iter().all(|scene| !scene.source_kind.states_materials())
     }
 
     pub fn comparisons(&self) -> impl Iterator<Item = &SceneVerdict> {

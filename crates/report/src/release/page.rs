@@ -3,6 +3,7 @@
 //! Its first lines are numbers at a glance, what fails, and what was not given.
 
 use mateval_dataset::{Finding, Severity};
+use mateval_eval::protocol::Protocol;
 use mateval_pages as pages;
 use mateval_prep::stats::{Spread, StatsFile};
 use minijinja::context;
@@ -11,7 +12,7 @@ use serde::Serialize;
 
 use super::file::{Evaluated, ReleaseFile};
 use super::given::ReferenceScores;
-use super::page_scene::{SHOWN_SCORES, ScenePage, cpu_seconds, duration, plural, worst_psnr};
+use super::page_scene::{ScenePage, cpu_seconds, duration, plural, shown_scores, worst_psnr};
 
 const TEMPLATE: &str = include_str!("page.j2");
 
@@ -47,13 +48,13 @@ pub(crate) fn page(file: &ReleaseFile) -> String {
     // The sort is stable: the dataset's order remains within the failures and the others.
     sorted.sort_by_key(|page| !page.fails());
     let script = format!("{}\n{OPEN}", pages::SORT);
-    let columns = SHOWN_SCORES.map(|(title, _)| title);
+    let columns = shown_scores(file).map(|(title, unit, _)| (title, unit));
     let values = context! {
         title => format!("{} {}", file.dataset.name, file.dataset.version),
         file => Serde(file), secrecy => file.withheld.as_ref().map(|withheld| withheld.secrecy.text()), scenes => Serde(&sorted), headlines => Serde(headlines(file)),
         failures => Serde(failures), whole => whole_findings(file), not_given => Serde(not_given(file)),
         table_one => Serde(rows(&file.stats, file.evaluated)), columns, bounds => Serde(bounds(file)),
-        is_good => file.is_good(),
+        is_good => file.is_good(), is_captured => file.is_captured(),
     };
     pages::single(TEMPLATE, values, &script)
 }
@@ -79,7 +80,7 @@ struct Failure {
 
 fn headlines(file: &ReleaseFile) -> Vec<Headline> {
     let mut all = vec![scenes(file), verified_headline(file), compared_headline(file), noise_headline(file)];
-    all.extend(SHOWN_SCORES.map(|(title, key)| {
+    all.extend(shown_scores(file).map(|(title, unit, key)| {
         let mean = |scores: &Option<ReferenceScores>| {
             let value = scores.as_ref().and_then(|scores| scores.summary.get(&key));
             value.map(|value| key.metric.style().text(*value))
@@ -94,7 +95,7 @@ fn headlines(file: &ReleaseFile) -> Vec<Headline> {
                 format!("{} – {}", text(floor), text(ceiling))
             }
         };
-        plain(value, format!("floor to ceiling: {}, PSNR in dB", title.to_lowercase()))
+        plain(value, format!("floor to ceiling: {}, {unit}", title.to_lowercase()))
     }));
     all.push(cost_headline(file));
     all
@@ -198,8 +199,12 @@ fn not_given(file: &ReleaseFile) -> Vec<Missing> {
             ],
         });
     }
-    missing.extend(without_bound("ceiling", "gt", file.ceiling.as_ref(), all));
-    missing.extend(without_bound("floor", "grey", file.floor.as_ref(), all));
+    let protocol = if file.is_captured() { format!(" --protocol {}", Protocol::CAPTURE) } else { String::new() };
+    // The truth of a captured room is not known, so that nothing could be its ceiling.
+    if !file.is_captured() {
+        missing.extend(without_bound("ceiling", "gt", file.ceiling.as_ref(), all, &protocol));
+    }
+    missing.extend(without_bound("floor", "grey", file.floor.as_ref(), all, &protocol));
     if no_cost > 0 {
         let what = format!("The cost of {no_cost} of {all} scenes was not recorded in the dataset's `.build`");
         missing.push(Missing { what, commands: Vec::new() });
@@ -207,13 +212,19 @@ fn not_given(file: &ReleaseFile) -> Vec<Missing> {
     missing
 }
 
-/// What is missing of a bound, which is the result of the baseline `method`.
-fn without_bound(name: &str, method: &str, scores: Option<&ReferenceScores>, all: usize) -> Option<Missing> {
+/// What is missing of a bound, which is the result of the baseline `method`. `protocol` are the words that choose one.
+fn without_bound(
+    name: &str,
+    method: &str,
+    scores: Option<&ReferenceScores>,
+    all: usize,
+    protocol: &str,
+) -> Option<Missing> {
     let commands = || {
         vec![
             format!("mateval baseline {method} --dataset DATASET --out {method}"),
-            format!("mateval eval score {method} --dataset DATASET --out {method}.json"),
-            format!("mateval prep publish DATASET --report DIR --{name} {method}.json"),
+            format!("mateval eval score {method} --dataset DATASET{protocol} --out {method}.json"),
+            format!("mateval prep publish DATASET --report DIR{protocol} --{name} {method}.json"),
         ]
     };
     match scores {
@@ -452,6 +463,24 @@ mod tests {
         ] {
             assert!(summary.contains(text), "no '{text}' in {summary}");
         }
+    }
+
+    /// Nothing is asked for that a captured room does not have. The twin is one rendered room among them.
+    #[test]
+    fn captured_rooms_have_scores_of_their_own() {
+        let mut file = ReleaseFile { ceiling: None, floor: None, ..release() };
+        file.stats.per_scene.iter_mut().for_each(|scene| scene.source_kind = SourceKind::Capture);
+        let html = page(&file);
+        for text in
+            ["measured on regions", "measured colours, CIEDE2000", "DATASET --protocol capture-1 --out grey.json"]
+        {
+            assert!(html.contains(text), "no '{text}'");
+        }
+        assert!(!html.contains("baseline gt") && !html.contains("albedo, novel views"));
+        file.stats.per_scene[0].source_kind = SourceKind::Front3d;
+        let html = page(&file);
+        assert!(html.contains("baseline gt") && html.contains("albedo, novel views, PSNR in dB"));
+        assert!(!html.contains("capture-1"));
     }
 
     #[test]

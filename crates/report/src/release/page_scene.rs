@@ -11,11 +11,25 @@ use serde::Serialize;
 use super::file::{ReleaseFile, ReleasedScene};
 use super::given::{ReferenceScores, SceneVerdict, StateCount};
 
-/// The scores of the table's columns.
-pub(crate) const SHOWN_SCORES: [(&str, ResultKey); 2] = [
-    ("Albedo, novel views", ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Psnr)),
-    ("Light, novel views", ResultKey::whole(PictureKind::RgbTrue, Views::Novel, Metric::Psnr)),
+/// A score that the page shows: its title, its unit and its key.
+pub(crate) type ShownScore = (&'static str, &'static str, ResultKey);
+
+const PSNR_IN_DB: &str = "PSNR in dB";
+
+const OF_RENDERED: [ShownScore; 2] = [
+    ("Albedo, novel views", PSNR_IN_DB, ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Psnr)),
+    ("Light, novel views", PSNR_IN_DB, ResultKey::whole(PictureKind::RgbTrue, Views::Novel, Metric::Psnr)),
 ];
+
+const OF_CAPTURED: [ShownScore; 2] = [
+    ("Measured colours", "CIEDE2000", ResultKey::whole(PictureKind::Measured, Views::Input, Metric::RegionDeltaE)),
+    ("Other photos", PSNR_IN_DB, ResultKey::whole(PictureKind::RgbFitted, Views::Novel, Metric::Psnr)),
+];
+
+/// The scores of the table's columns.
+pub(crate) fn shown_scores(file: &ReleaseFile) -> [ShownScore; 2] {
+    if file.is_captured() { OF_CAPTURED } else { OF_RENDERED }
+}
 
 /// A cell: what the column is sorted by, and its text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -77,7 +91,7 @@ impl<'a> ScenePage<'a> {
             categories: known(stats.counts.different_super_categories()),
             noise: noise(file, scene),
             cost: cost(&scene.costs),
-            scores: SHOWN_SCORES.map(|(_, key)| between(file, scene, key)).into(),
+            scores: shown_scores(file).map(|(_, _, key)| between(file, scene, key)).into(),
             findings: findings(scene),
             verify_findings: file.verified(&scene.scene).map(Finding::to_string).collect(),
             source_findings: scene.findings.iter().map(Finding::to_string).collect(),

@@ -28,6 +28,8 @@ pub(crate) struct SurfaceEmission {
 #[derive(Debug)]
 pub(crate) struct AreaEmitter {
     pub(crate) light: LightIndex,
+    /// Whether it is a flash among the lights of a stage.
+    pub(crate) is_flash: bool,
     emission: SurfaceEmission,
     /// Empty for a stage light.
     surfaces: Vec<SurfaceIndex>,
@@ -158,6 +160,7 @@ impl AreaEmitter {
         let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !emission.two_sided));
         Self {
             light,
+            is_flash: false,
             emission,
             triangles,
             records,

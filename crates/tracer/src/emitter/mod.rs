@@ -70,18 +70,21 @@ pub struct EmitterSample {
     pub density: f32,
     /// The point on the emitter; `None` for an emitter at infinity.
     pub place: Option<SurfaceHit>,
-    /// Whether the emitter is a stage light, which facets do not mirror.
-    pub on_stage: bool,
+    /// Whether surfaces reflect it diffusely alone: a stage light other than a flash.
+    pub is_matt: bool,
 }
 
-/// A light added to a scene so that it is lit as in a photo. It blocks no light, it is invisible to the camera, and it
-/// makes no highlights: surfaces reflect it diffusely.
+/// A light added to a scene so that it is lit as in a photo. It blocks no light, it is invisible to the camera, and,
+/// except for a flash, it makes no highlights: surfaces reflect it diffusely.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageLight {
     /// World space, in metres. The front emits.
     pub mesh: TriangleMesh,
     /// Linear Rec. 709.
     pub radiance: [f32; 3],
+    /// Whether it is a lamp of known place, as a flash at the camera is. Such a light makes highlights, and is sampled
+    /// as often as a lamp of 4 m² in its place would be: it is small, but brings much of the light.
+    pub is_flash: bool,
 }
 
 /// Radiance that a ray has met by chance.
@@ -100,6 +103,8 @@ pub const UNIFORM_SHARE: f32 = 0.2;
 const FEW_ESCAPE: f32 = 0.005;
 /// The least weight of an emitter at infinity, so that it is sampled even where no probe reaches it.
 const LEAST_SKY: f32 = 0.01;
+/// The area, in square metres, by which the solid angle of a flash is estimated when emitters are chosen.
+const FLASH_AREA_M2: f32 = 4.0;
 /// Above this number of emitting surfaces, the surfaces of a light group are sampled as one emitter.
 const SEPARATE_SURFACES: usize = 64;
 
@@ -188,9 +193,14 @@ impl Emitters {
             }
             let emission = SurfaceEmission { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
             let group = LightIndex(groups + index);
-            self.areas.push(Arc::new(AreaEmitter::new(&[&light.mesh], group, emission, Vec::new(), self.scene_size)));
+            let mut area = AreaEmitter::new(&[&light.mesh], group, emission, Vec::new(), self.scene_size);
+            area.is_flash = light.is_flash;
+            self.areas.push(Arc::new(area));
         }
-        self.outlines = Outlines::new(&self.areas);
+        let flash_factor = |area: &Arc<AreaEmitter>| FLASH_AREA_M2 / area.area().max(f32::MIN_POSITIVE);
+        let factors: Vec<f32> =
+            self.areas.iter().map(|area| if area.is_flash { flash_factor(area) } else { 1.0 }).collect();
+        self.outlines = Outlines::new(&self.areas).scaled(&factors);
         self.camera_visible.extend(stage.iter().map(|_| false));
         self.stage = Some(Arc::new(accel));
         Ok(self)
@@ -300,10 +310,10 @@ impl Emitters {
         if !area.emits(&place, -direction) || !density.is_finite() || density <= 0.0 {
             return None;
         }
-        let on_stage = area.is_on_stage();
-        let cover = if on_stage { 1.0 } else { opacity(&place).clamp(0.0, 1.0) };
+        let cover = if area.is_on_stage() { 1.0 } else { opacity(&place).clamp(0.0, 1.0) };
         let radiance = area.radiance(&place) * cover;
-        Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place), on_stage })
+        let is_matt = area.is_on_stage() && !area.is_flash;
+        Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place), is_matt })
     }
 
     /// `choice` is below the probability of all emitters at infinity.
@@ -325,7 +335,7 @@ impl Emitters {
             radiance: emitter.radiance(direction),
             density,
             place: None,
-            on_stage: false,
+            is_matt: false,
         })
     }
 
@@ -339,9 +349,9 @@ impl Emitters {
         self.stage.is_some()
     }
 
-    /// The light that stage lights along `ray` emit back towards `from`. They block nothing, not even each other, so
-    /// all of them count, in the order of the lights.
-    pub(crate) fn stage_along(&self, ray: &Ray, from: Vec3) -> impl Iterator<Item = Emitted> + '_ {
+    /// The light that stage lights along `ray` emit back towards `from`, and whether each is a flash. They block
+    /// nothing, not even each other, so all of them count, in the order of the lights.
+    pub(crate) fn stage_along(&self, ray: &Ray, from: Vec3) -> impl Iterator<Item = (Emitted, bool)> + '_ {
         let met = std::cell::RefCell::new(Vec::new());
         if let Some(stage) = &self.stage {
             // Rejecting every hit makes the traversal visit all of them.
@@ -354,7 +364,8 @@ impl Emitters {
         met.sort_by_key(|hit| hit.global);
         met.into_iter().filter_map(move |hit| {
             let area = self.first_on_stage + hit.surface.0;
-            self.emitted_by(area, &self.areas[area].place_on_stage(hit.triangle, hit.barycentrics), from)
+            let place = self.areas[area].place_on_stage(hit.triangle, hit.barycentrics);
+            Some((self.emitted_by(area, &place, from)?, self.areas[area].is_flash))
         })
     }
 

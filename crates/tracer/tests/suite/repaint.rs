@@ -187,7 +187,7 @@ fn floor_and_stage() -> (World, Vec<StageLight>, Camera) {
     // The scene's own lamp, which must be dark on the stage.
     let world = Builder::default().surface(floor, grey(0.5)).surface(lamp, grey(0.5)).glowing([100.0; 3]).world();
     let mesh = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::X, Vec3::Z);
-    let stage = vec![StageLight { mesh, radiance: [2.0, 1.0, 0.0] }];
+    let stage = vec![StageLight { mesh, radiance: [2.0, 1.0, 0.0], is_flash: false }];
     (world, stage, camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5))
 }
 
@@ -219,19 +219,27 @@ fn a_stage_lights_the_floor_and_hides_nothing() {
     assert!(seen(&world.on_stage(&turned).unwrap(), &camera)[0] < 1e-5 * expected);
 }
 
-/// What the camera sees of a square lamp above a floor of the given base colour, roughness and metallic: as a light of
-/// a stage, or as a surface of the scene.
-fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, staged: bool) -> f64 {
+/// What a square above a floor is.
+#[derive(Clone, Copy, PartialEq)]
+enum Lamp {
+    OnStage,
+    Flash,
+    /// A surface of the scene.
+    Surface,
+}
+
+/// What the camera sees of a square lamp above a floor of the given base colour, roughness and metallic.
+fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, kind: Lamp) -> f64 {
     let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
     let model = principled([color; 3], roughness, metallic, flavour);
     let lamp = quad(Vec3::new(-0.5, 3.0, -0.5), Vec3::X, Vec3::Z);
     let camera = camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5);
     let builder = Builder::default().surface(floor, material(model));
-    let world = if staged {
-        let stage = [StageLight { mesh: lamp, radiance: [1.0; 3] }];
-        builder.world().on_stage(&stage).unwrap()
-    } else {
+    let world = if kind == Lamp::Surface {
         builder.surface(lamp, grey(0.0)).glowing([1.0; 3]).world()
+    } else {
+        let stage = [StageLight { mesh: lamp, radiance: [1.0; 3], is_flash: kind == Lamp::Flash }];
+        builder.world().on_stage(&stage).unwrap()
     };
     seen(&world, &camera)[0]
 }
@@ -240,11 +248,21 @@ fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, 
 /// the scene, the same square is mirrored.
 #[test]
 fn no_facets_show_a_stage() {
-    let black = |roughness: f32, staged: bool| shine(PrincipledFlavour::Blender, 0.0, roughness, 0.0, staged);
+    let black = |roughness: f32, kind: Lamp| shine(PrincipledFlavour::Blender, 0.0, roughness, 0.0, kind);
     for roughness in [0.1, 0.4, 1.0] {
-        assert_eq!(black(roughness, true), 0.0);
+        assert_eq!(black(roughness, Lamp::OnStage), 0.0);
     }
-    assert!((black(0.1, false) - 0.04).abs() < 2e-3 && black(0.4, false) > 0.01);
+    assert!((black(0.1, Lamp::Surface) - 0.04).abs() < 2e-3 && black(0.4, Lamp::Surface) > 0.01);
+}
+
+/// A flash makes the highlights that a lamp of the scene in its place makes: plastic and metal, smooth and rough.
+#[test]
+fn a_flash_is_mirrored_as_a_lamp_of_the_scene_is() {
+    for (color, roughness, metallic) in [(0.0, 0.1, 0.0), (0.0, 0.4, 0.0), (0.6, 0.3, 1.0)] {
+        let [flash, lamp] = [Lamp::Flash, Lamp::Surface]
+            .map(|kind| shine(PrincipledFlavour::Blender, color, roughness, metallic, kind));
+        assert!((flash / lamp - 1.0).abs() < 0.05, "{color} {roughness} {metallic}: {flash} {lamp}");
+    }
 }
 
 /// Metal reflects a stage as a Lambertian surface of its base colour does, at every roughness; Blender's facets absorb a
@@ -252,44 +270,54 @@ fn no_facets_show_a_stage() {
 #[test]
 fn metal_is_matt_on_a_stage() {
     for flavour in [PrincipledFlavour::Blender, PrincipledFlavour::Mitsuba] {
-        let matt = shine(flavour, 0.6, 1.0, 0.0, true);
+        let matt = shine(flavour, 0.6, 1.0, 0.0, Lamp::OnStage);
         for roughness in [0.05, 0.3, 0.7] {
-            let metal = shine(flavour, 0.6, roughness, 1.0, true);
+            let metal = shine(flavour, 0.6, roughness, 1.0, Lamp::OnStage);
             assert!((metal / matt - 1.0).abs() < 0.15, "{flavour:?} {roughness}: {metal} {matt}");
         }
-        assert!(shine(flavour, 0.6, 0.05, 1.0, false) > 5.0 * matt, "the twin passes");
+        assert!(shine(flavour, 0.6, 0.05, 1.0, Lamp::Surface) > 5.0 * matt, "the twin passes");
     }
 }
 
-/// A room of matt walls with a smooth floor, and a stage of two lights, one of them 2 mm in front of the back wall.
-fn room_on_stage() -> World {
+/// A room of matt walls with a smooth floor, and a stage of two lights: one under the ceiling, and one 2 mm in front of
+/// the back wall. If the first is a flash, which takes most of the samples, the second is half a metre in front of the
+/// wall.
+fn room_on_stage(has_flash: bool) -> World {
     let smooth = principled([0.7, 0.5, 0.3], 0.1, 0.3, PrincipledFlavour::Blender);
     let floor = quad(Vec3::new(-0.9, -0.9, -0.998), Vec3::Z * 1.8, Vec3::X * 1.8);
     let world = World::new(Arc::new(lit_room([[1.0; 3]; 4]))).unwrap();
     let scene = Builder::from(world.scene().clone()).surface(floor, material(smooth)).scene();
     let ceiling = quad(Vec3::new(-0.5, 0.8, -0.5), Vec3::X * 0.6, Vec3::Z * 0.6);
-    let back = quad(Vec3::new(-0.8, -0.95, -0.998), Vec3::X * 1.6, Vec3::Y * 1.6);
-    let stage = [(ceiling, [2.0, 3.0, 1.0]), (back, [1.0, 0.5, 2.0])];
-    World::new(Arc::new(scene)).unwrap().on_stage(&stage.map(|(mesh, radiance)| StageLight { mesh, radiance })).unwrap()
+    let depth = if has_flash { -0.5 } else { -0.998 };
+    let back = quad(Vec3::new(-0.8, -0.95, depth), Vec3::X * 1.6, Vec3::Y * 1.6);
+    let stage = [(ceiling, [2.0, 3.0, 1.0], has_flash), (back, [1.0, 0.5, 2.0], false)];
+    let stage = stage.map(|(mesh, radiance, is_flash)| StageLight { mesh, radiance, is_flash });
+    World::new(Arc::new(scene)).unwrap().on_stage(&stage).unwrap()
 }
 
-/// Sampling stage lights, the BSDF or both gives one picture. Beside a light, both together are far less noisy than
-/// light sampling alone.
+/// Sampling stage lights, the BSDF or both gives one picture, also of a flash. Beside a light, both together are far
+/// less noisy than light sampling alone.
 #[test]
 fn ways_of_finding_a_stage_agree() {
-    let world = room_on_stage();
-    let by = |light_sampling: LightSampling, seed: u64| {
-        let settings = RenderSettings { samples: 32, seed, light_sampling, ..Default::default() };
-        Renders::new(&world, &view(32), settings, 16)
-    };
-    let [both, emitters, bsdf] = [(LightSampling::Both, 1), (LightSampling::Emitters, 2), (LightSampling::Bsdf, 3)]
-        .map(|(how, seed)| by(how, seed));
-    for other in [&emitters, &bsdf] {
-        let found = worst(&both, other);
-        assert!(found < 4.5, "{found}");
+    for has_flash in [false, true] {
+        let world = room_on_stage(has_flash);
+        let by = |light_sampling: LightSampling, seed: u64| {
+            let settings = RenderSettings { samples: 32, seed, light_sampling, ..Default::default() };
+            Renders::new(&world, &view(32), settings, 16)
+        };
+        let [both, emitters, bsdf] = [(LightSampling::Both, 1), (LightSampling::Emitters, 2), (LightSampling::Bsdf, 3)]
+            .map(|(how, seed)| by(how, seed));
+        for other in [&emitters, &bsdf] {
+            let found = worst(&both, other);
+            // Light sampling alone seldom meets the floor's highlight of the flash, so that its error is estimated too low:
+            // 4.6 was found, and 3.4 with eight times the samples, where a bias would have grown.
+            assert!(found < if has_flash { 5.5 } else { 4.5 }, "{has_flash}: {found}");
+        }
+        if !has_flash {
+            let [both, emitters] = [both, emitters].map(|renders| renders.whole().error);
+            assert!(both < 0.7 * emitters, "{both} {emitters}");
+        }
     }
-    let [both, emitters] = [both, emitters].map(|renders| renders.whole().error);
-    assert!(both < 0.7 * emitters, "{both} {emitters}");
 }
 
 /// Stage lights without triangles or with invalid radiances are refused.

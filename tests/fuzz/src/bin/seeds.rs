@@ -60,6 +60,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let header = "{'descr': '<i4', 'fortran_order': False, 'shape': (3,), }";
     let numbers = [&b"\x93NUMPY\x01\x00\x76\x00"[..], format!("{header:117}\n").as_bytes(), &[1, 0, 0, 0].repeat(3)].concat();
     keep(&corpus, "npy", "labels", &numbers)?;
+    for (name, photometric) in [("grey", 1), ("rgb", 2), ("mosaic", 32803)] {
+        keep(&corpus, "photo", &format!("{name}.tif"), &tiff(photometric))?;
+    }
     maps(&corpus, work.path())?;
     archives(&corpus, work.path())?;
     captures(&corpus, &numbers)?;
@@ -70,6 +73,24 @@ fn keep(corpus: &Path, target: &str, name: &str, bytes: &[u8]) -> std::io::Resul
     let folder = corpus.join(target);
     std::fs::create_dir_all(&folder)?;
     std::fs::write(folder.join(name), bytes)
+}
+
+/// A little-endian TIFF of 4x2 pixels with this photometric interpretation: 2 is RGB, all others have one number per
+/// pixel.
+fn tiff(photometric: u16) -> Vec<u8> {
+    let samples: u16 = if photometric == 2 { 3 } else { 1 };
+    let length = 4 * 2 * samples;
+    // Width, height, bits, compression, interpretation, the strip's offset behind the tags, samples, rows, bytes.
+    let size = [(256, 4), (257, 2), (258, 8), (259, 1), (262, photometric)];
+    let tags = [&size[..], &[(273, 122), (277, samples), (278, 2), (279, length)]].concat();
+    let mut bytes = b"II*\0\x08\0\0\0\x09\0".to_vec();
+    for (tag, value) in tags {
+        // One value of the type SHORT.
+        bytes.extend([tag, 3, 1, 0, value, 0].into_iter().flat_map(u16::to_le_bytes));
+    }
+    bytes.extend([0; 4]);
+    bytes.extend((0..length).map(|at| 9 * at as u8));
+    bytes
 }
 
 /// Maps of the smallest size, of every kind; the first byte selects the map.
