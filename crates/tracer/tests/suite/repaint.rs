@@ -309,8 +309,8 @@ fn ways_of_finding_a_stage_agree() {
             .map(|(how, seed)| by(how, seed));
         for other in [&emitters, &bsdf] {
             let found = worst(&both, other);
-            // Light sampling alone seldom meets the floor's highlight of the flash, so that its error is estimated too low:
-            // 4.6 was found, and 3.4 with eight times the samples, where a bias would have grown.
+            // Light sampling alone seldom meets the flash's highlight on the floor, so that its error is estimated too
+            // low: 4.6 was found, and 3.4 with eight times the samples, where a bias would have grown.
             assert!(found < if has_flash { 5.5 } else { 4.5 }, "{has_flash}: {found}");
         }
         if !has_flash {
