@@ -9,6 +9,7 @@
 mod suite {
     mod cache;
     mod capture;
+    mod captured_photos;
     mod constancy;
     mod damages;
     mod mask_rules;

@@ -30,11 +30,11 @@ use crate::long_work::{Listener, failed, run_long, shown_in_notebook, wrong_shap
 /// The maps of an instance, encoded as a submission stores them.
 #[pyclass(frozen, get_all, module = "mateval")]
 pub struct Maps {
-    /// sRGB: (side, side, 3), uint8, RGB; None where the estimate has none.
+    /// sRGB: (side, side, 3), uint8, RGB; None if the estimate has none.
     base_color: Option<Py<PyArray3<u8>>>,
-    /// Perceptual roughness times 255: (side, side), uint8; None where the estimate has none.
+    /// Perceptual roughness times 255: (side, side), uint8; None if the estimate has none.
     roughness: Option<Py<PyArray2<u8>>>,
-    /// Metallic times 255: (side, side), uint8; None where the estimate has none.
+    /// Metallic times 255: (side, side), uint8; None if the estimate has none.
     metallic: Option<Py<PyArray2<u8>>>,
     /// Whether the input view shows each texel: (side, side), bool; None from procedural without keep_seen.
     seen: Option<Py<PyArray2<bool>>>,

@@ -224,7 +224,7 @@ pub fn psnr(
 
 /// The structural similarity in windows of 11x11 pixels, of arrays as `psnr` takes them, at least 11 pixels wide and
 /// high. The scorer compares sRGB-encoded albedo. Where mask is given, only windows that lie wholly inside it count;
-/// None where there are none.
+/// None without such a window.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
 pub fn ssim(
@@ -268,7 +268,7 @@ fn not_measured(error: impl Into<anyhow::Error>) -> PyErr {
 }
 
 /// LPIPS 0.1 with AlexNet, of sRGB-encoded arrays of shape (height, width, 3), RGB (not BGR as OpenCV reads it). Where
-/// mask is given, the mean is over its pixels; None where there are none. Fails where the network's weights were not
+/// mask is given, the mean is over its pixels; None if it is empty. Fails where the network's weights were not
 /// fetched.
 #[pyfunction]
 #[pyo3(signature = (prediction, reference, mask=None))]
